@@ -1,0 +1,49 @@
+# Language level, warnings, sanitizers and ccache for every target of the project.
+#
+# No architecture flags here: a unit that sees GTSAM or PCL must share the flags of the packaged libraries, or Eigen's
+# alignment differs and the program crashes.
+
+set(CMAKE_CXX_STANDARD 23)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+# Symbols stay small: -O2 with line tables is enough for profiles and backtraces.
+set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
+
+option(IGNIS_WARNINGS_AS_ERRORS "Treat warnings as errors" OFF)
+set(IGNIS_SANITIZERS "" CACHE STRING "Value for -fsanitize=, for example address,undefined")
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+if(IGNIS_SANITIZERS)
+  add_compile_options(-fsanitize=${IGNIS_SANITIZERS} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${IGNIS_SANITIZERS})
+endif()
+
+add_library(ignis_warnings INTERFACE)
+target_compile_options(ignis_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+                       $<$<BOOL:${IGNIS_WARNINGS_AS_ERRORS}>:-Werror>)
+
+# ignis_add_library(NAME SOURCES... [LINK PUBLIC|PRIVATE targets...]): a core library that sees src/ as include root.
+function(ignis_add_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR}/src)
+  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} ignis_warnings)
+endfunction()
+
+# ignis_add_test(NAME SOURCES... LINK targets...): a GoogleTest program; each test becomes a ctest entry.
+function(ignis_add_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/test)
+  target_compile_definitions(${name} PRIVATE IGNIS_TEST_DATA="${CMAKE_SOURCE_DIR}/test/data"
+                             IGNIS_CONFIG_DIR="${CMAKE_SOURCE_DIR}/config")
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main ignis_warnings)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+endfunction()

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "common/config_json.h"
+
+#include <fstream>
+#include <iterator>
+#include <numeric>
+
+namespace ignis::config {
+namespace {
+
+constexpr int kMaxDepth = 16;
+
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+Json parse_json(const std::string& text, const std::string& source) {
+  std::vector<std::set<std::string>> open_objects;
+  std::string fault;
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (depth > kMaxDepth && fault.empty()) fault = std::format("nesting deeper than {}", kMaxDepth);
+    if (event == Json::parse_event_t::object_start) open_objects.emplace_back();
+    if (event == Json::parse_event_t::object_end) open_objects.pop_back();
+    if (event == Json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second &&
+        fault.empty()) {
+      fault = std::format("the key \"{}\" stands twice", parsed.get<std::string>());
+    }
+    return fault.empty();
+  };
+  Json json;
+  try {
+    json = Json::parse(text, watch);
+  } catch (const Json::exception& error) {
+    throw ConfigError(std::format("{}: not valid JSON: {}", source, error.what()));
+  }
+  if (!fault.empty()) throw ConfigError(std::format("{}: {}", source, fault));
+  if (!json.is_object()) throw ConfigError(std::format("{}: the outermost value must be an object", source));
+  return json;
+}
+
+Json read_json(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) throw ConfigError(std::format("{}: no such file", file.string()));
+  if (std::filesystem::is_directory(file, error)) throw ConfigError(std::format("{}: is a folder", file.string()));
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw ConfigError(std::format("{}: cannot be read", file.string()));
+  return parse_json({std::istreambuf_iterator<char>(stream), {}}, file.string());
+}
+
+std::string nearest_word(const std::string& word, const std::set<std::string>& known) {
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = edit_distance(word, candidate);
+    if (distance < best_distance) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+void Loader::refuse_unknown_keys() {
+  for (const auto& [key, value] : object_.items()) {
+    // "$schema" is how editors find the schema; it configures nothing.
+    if (known_.contains(key) || (path_.empty() && key == "$schema")) continue;
+    const std::string near = nearest_word(key, known_);
+    offences_.push_back(
+        {join(key), value.dump(), near.empty() ? "no such key" : std::format("no such key; did you mean \"{}\"?", near)});
+  }
+}
+
+}  // namespace ignis::config

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+
+namespace ignis {
+
+/// A file that appears under its name only when it is complete: written as `name.tmp`, renamed by commit(). Without
+/// commit() the temporary file is removed. Throws std::runtime_error that names the path and the system's reason.
+class FileOutput {
+ public:
+  explicit FileOutput(std::filesystem::path path);
+  ~FileOutput();
+  FileOutput(const FileOutput&) = delete;
+  FileOutput& operator=(const FileOutput&) = delete;
+
+  [[nodiscard]] std::ofstream& stream() { return stream_; }
+
+  /// The name under which the file is being written, for libraries that open files themselves.
+  [[nodiscard]] const std::filesystem::path& temporary_path() const { return temporary_; }
+
+  /// Flushes, checks for write errors and renames.
+  void commit();
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  std::ofstream stream_;
+  bool committed_ = false;
+};
+
+}  // namespace ignis
