@@ -44,7 +44,8 @@ Json parse_json(const std::string& text, const std::string& source) {
   try {
     json = Json::parse(text, watch);
   } catch (const Json::exception& error) {
-    throw ConfigError(std::format("{}: not valid JSON: {}", source, error.what()));
+    // What the callback refused is the cause; the parser's own complaint may only be its consequence.
+    if (fault.empty()) fault = std::format("not valid JSON: {}", error.what());
   }
   if (!fault.empty()) throw ConfigError(std::format("{}: {}", source, fault));
   if (!json.is_object()) throw ConfigError(std::format("{}: the outermost value must be an object", source));

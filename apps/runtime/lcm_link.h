@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <lcm/lcm-cpp.hpp>
+
+#include "messages/length_check.h"
+#include "runtime/application.h"
+#include "runtime/sequence_tracker.h"
+
+namespace ignis::runtime {
+
+/// What one subscription received and lost. Published in health_t.
+struct ReceiverCounts {
+  std::string channel;
+  std::int64_t received = 0;
+  std::int64_t lost = 0;         ///< by the sender's running number, and scans or keyframes with a part missing
+  std::int64_t rejected = 0;     ///< wrong type, or a length that contradicts the counts inside
+  std::int64_t queue_drops = 0;  ///< skipped by this process because it was late
+};
+
+/// Whether the running numbers of a channel can be checked: several senders share HEALTH and KEYFRAME_REQUEST.
+enum class Senders : std::uint8_t { kOne, kSeveral };
+
+/// A process's end of the bus: checked opening, subscriptions with their own queue capacity, length checks before any
+/// decoder, loss counters, and HEALTH. One thread calls handle(); handlers run inside it. publish() may be called from
+/// any thread.
+class LcmLink {
+ public:
+  /// Opens the bus. Throws UserError that says what to do (no multicast route, bad URL).
+  explicit LcmLink(const Application& application);
+
+  template <class Message>
+  void publish(const std::string& channel, const Message& message) {
+    if (lcm_.publish(channel, &message) != 0) ++failed_sends_;
+  }
+
+  /// Calls `handler` with each well-formed message. The counts stay valid as long as the link.
+  template <class Message>
+  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity,
+                            std::function<void(const Message&)> handler, Senders senders = Senders::kOne) {
+    Receiver& receiver = receivers_.emplace_back();
+    receiver.counts.channel = channel;
+    receiver.deliver = [&receiver, handler = std::move(handler), senders](std::span<const std::byte> data) {
+      Message message;
+      if (!messages::decode_checked(data, message)) {
+        ++receiver.counts.rejected;
+        return;
+      }
+      ++receiver.counts.received;
+      if (senders == Senders::kOne) receiver.counts.lost += receiver.sequence.observe(message.sequence);
+      handler(message);
+    };
+    subscribe_raw(receiver, queue_capacity);
+    return receiver.counts;
+  }
+
+  /// Waits at most `timeout_ms` for one message and handles it. True when one was handled.
+  bool handle(int timeout_ms);
+
+  /// Publishes HEALTH when a second has passed or `state` changed. `utime`: newest measurement seen [us]. `state`: one of
+  /// health_t's constants.
+  void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
+
+  [[nodiscard]] std::int64_t failed_sends() const { return failed_sends_; }
+
+ private:
+  struct Receiver {
+    ReceiverCounts counts;
+    SequenceTracker sequence;
+    std::function<void(std::span<const std::byte>)> deliver;
+  };
+
+  void subscribe_raw(Receiver& receiver, int queue_capacity);
+  static void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel, Receiver* receiver);
+
+  std::string process_;
+  std::string config_hash_;
+  lcm::LCM lcm_;
+  std::deque<Receiver> receivers_;  // a deque keeps addresses stable
+  std::int64_t failed_sends_ = 0;
+  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point last_health_{};
+  std::string last_state_text_;
+  std::int32_t health_sequence_ = 0;
+};
+
+}  // namespace ignis::runtime

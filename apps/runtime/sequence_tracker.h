@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace ignis::runtime {
+
+/// Counts what a receiver missed by the sender's running number. LCM over UDP counts nothing itself.
+class SequenceTracker {
+ public:
+  /// Messages missed between the newest one seen so far and this one. Parts of one sequence, repeats and late arrivals
+  /// count nothing. A number far below the newest means that the sender started again.
+  std::int64_t observe(std::int32_t sequence) {
+    constexpr std::int32_t kRestartDistance = 1000;
+    if (!newest_ || sequence < *newest_ - kRestartDistance || (sequence == 0 && *newest_ > 0)) {
+      newest_ = sequence;
+      return 0;
+    }
+    if (sequence <= *newest_) return 0;
+    const std::int64_t missed = static_cast<std::int64_t>(sequence) - *newest_ - 1;
+    newest_ = sequence;
+    return missed;
+  }
+
+ private:
+  std::optional<std::int32_t> newest_;
+};
+
+}  // namespace ignis::runtime

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace ignis::messages {
+
+/// Most points in one message: five 4-byte arrays of this many stay below 60 kB, so a part is one datagram.
+inline constexpr std::int64_t kMaxPointsPerPart = 2900;
+
+/// Collects the numbered parts of one sequence and hands them over, in order, when the last one is in. A part of a newer
+/// sequence ends the wait for the older one, which is then counted as incomplete. Parts of one sequence may arrive in
+/// any order and more than once.
+template <class Message>
+class PartAssembler {
+ public:
+  /// The complete set of parts, or nothing yet. Parts with impossible numbering are ignored and counted as incomplete.
+  std::optional<std::vector<Message>> add(const Message& part) {
+    if (part.part_count < 1 || part.part < 0 || part.part >= part.part_count) {
+      ++incomplete_;
+      return std::nullopt;
+    }
+    if (part.part_count == 1) {
+      abandon();
+      return std::vector<Message>{part};
+    }
+    if (parts_.empty() || sequence_ != part.sequence || std::ssize(parts_) != part.part_count) {
+      abandon();
+      sequence_ = part.sequence;
+      parts_.resize(static_cast<std::size_t>(part.part_count));
+      missing_ = part.part_count;
+    }
+    std::optional<Message>& slot = parts_[static_cast<std::size_t>(part.part)];
+    if (!slot) --missing_;
+    slot = part;
+    if (missing_ > 0) return std::nullopt;
+    std::vector<Message> complete;
+    complete.reserve(parts_.size());
+    for (std::optional<Message>& each : parts_) complete.push_back(std::move(*each));
+    parts_.clear();
+    return complete;
+  }
+
+  /// Sequences that were given up because a part never came.
+  [[nodiscard]] std::int64_t incomplete() const { return incomplete_; }
+
+ private:
+  void abandon() {
+    if (!parts_.empty()) ++incomplete_;
+    parts_.clear();
+  }
+
+  std::vector<std::optional<Message>> parts_;
+  std::int64_t missing_ = 0;
+  std::int64_t incomplete_ = 0;
+  std::int32_t sequence_ = 0;
+};
+
+}  // namespace ignis::messages

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/measurements.h"
+#include "ignis/imu_t.hpp"
+#include "ignis/scan_t.hpp"
+#include "messages/part_assembler.h"
+
+/// L1_IMU and L1_SCAN.
+namespace ignis::messages {
+
+/// `temperature` in degrees Celsius, kUnknownTemperature when the sensor does not tell.
+inline constexpr float kUnknownTemperature = -1000.0F;
+[[nodiscard]] imu_t to_message(const ImuSample& sample, float temperature = kUnknownTemperature);
+[[nodiscard]] ImuSample from_message(const imu_t& message);
+
+/// A scan as one message, or as numbered parts when it does not fit one datagram.
+[[nodiscard]] std::vector<scan_t> to_messages(const Scan& scan);
+
+/// Puts the parts of scans together again.
+class ScanAssembler {
+ public:
+  /// A complete scan, or nothing yet.
+  [[nodiscard]] std::optional<Scan> add(const scan_t& part);
+  [[nodiscard]] std::int64_t incomplete() const { return parts_.incomplete(); }
+
+ private:
+  PartAssembler<scan_t> parts_;
+};
+
+}  // namespace ignis::messages

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "messages/keyframe_messages.h"
+
+#include <gtest/gtest.h>
+
+#include "common/so3.h"
+
+namespace ignis::messages {
+namespace {
+
+Keyframe keyframe_of(int samples, int points, float reach) {
+  Keyframe keyframe;
+  keyframe.id = 12;
+  keyframe.session = 2;
+  keyframe.state.utime = 9'000'000;
+  keyframe.state.T_odom_body = {so3::exp({0.1, 0.2, 0.3}), {1.0, 2.0, 3.0}};
+  keyframe.state.v_odom = {0.5, 0.0, -1.0};
+  keyframe.covariance = Matrix15d::Random();
+  keyframe.scan_information = Matrix6d::Random();
+  keyframe.previous_utime = 4'000'000;
+  keyframe.stationary = true;
+  for (int i = 0; i < samples; ++i) {
+    keyframe.imu.push_back({.utime = 4'000'000 + 4'000 * i, .gyro = {0.01 * i, 0, 0}, .accel = {0, 9.81, 0}});
+  }
+  for (int i = 0; i < points; ++i) {
+    const float ratio = static_cast<float>(i) / static_cast<float>(points);
+    keyframe.cloud.push_back({.position = {ratio * reach, -ratio, reach}, .intensity = 200.0F});
+  }
+  return keyframe;
+}
+
+TEST(KeyframeMessages, ComeTogetherAgainWithinTheirResolution) {
+  const Keyframe keyframe = keyframe_of(1250, 9000, 15.0F);
+  KeyframeAssembler assembler;
+  std::optional<Keyframe> back;
+  for (const keyframe_t& part : to_messages(keyframe)) {
+    EXPECT_LE(part.getEncodedSize(), 64'000);
+    back = assembler.add(part);
+  }
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->id, 12);
+  EXPECT_EQ(back->session, 2);
+  EXPECT_EQ(back->state.utime, keyframe.state.utime);
+  EXPECT_EQ(back->previous_utime, keyframe.previous_utime);
+  EXPECT_TRUE(back->stationary);
+  EXPECT_TRUE(back->imu_complete);
+  EXPECT_EQ(back->covariance, keyframe.covariance);
+  EXPECT_EQ(back->scan_information, keyframe.scan_information);
+  EXPECT_EQ(body_difference(back->state.T_odom_body, keyframe.state.T_odom_body).norm(), 0.0);
+  ASSERT_EQ(back->imu.size(), keyframe.imu.size());
+  EXPECT_EQ(back->imu[700].utime, keyframe.imu[700].utime);
+  EXPECT_NEAR(back->imu[700].gyro.x(), keyframe.imu[700].gyro.x(), 1e-6);
+  ASSERT_EQ(back->cloud.size(), keyframe.cloud.size());
+  for (std::size_t i = 0; i < keyframe.cloud.size(); ++i) {
+    ASSERT_LT((back->cloud[i].position - keyframe.cloud[i].position).norm(), 0.001F);
+  }
+}
+
+TEST(KeyframeMessages, CoarsenTheResolutionInsteadOfWrapping) {
+  const Keyframe keyframe = keyframe_of(1, 100, 120.0F);
+  KeyframeAssembler assembler;
+  const std::optional<Keyframe> back = assembler.add(to_messages(keyframe).front());
+  ASSERT_TRUE(back);
+  for (std::size_t i = 0; i < keyframe.cloud.size(); ++i) {
+    ASSERT_LT((back->cloud[i].position - keyframe.cloud[i].position).norm(), 0.004F);
+  }
+}
+
+}  // namespace
+}  // namespace ignis::messages

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "messages/sensor_messages.h"
+
+#include <gtest/gtest.h>
+
+namespace ignis::messages {
+namespace {
+
+Scan scan_of(std::int32_t points) {
+  Scan scan{.utime = 1'000, .sequence = 17, .duration_us = 50'000, .missing_packets = 2, .points = {}};
+  for (std::int32_t i = 0; i < points; ++i) {
+    const float value = static_cast<float>(i);
+    scan.points.push_back({.position = {value, -value, 0.5F * value}, .intensity = 3.0F, .dt_us = i});
+  }
+  return scan;
+}
+
+TEST(SensorMessages, ImuSurvivesTheRoundTrip) {
+  const ImuSample sample{
+      .utime = 5, .sequence = 9, .gyro = {0.1, 0.2, 0.3}, .accel = {1.0, 9.81, -2.0}, .saturated = true};
+  const ImuSample back = from_message(to_message(sample));
+  EXPECT_EQ(back.utime, sample.utime);
+  EXPECT_EQ(back.sequence, sample.sequence);
+  EXPECT_EQ(back.gyro, sample.gyro);
+  EXPECT_EQ(back.accel, sample.accel);
+  EXPECT_TRUE(back.saturated);
+}
+
+class ScanParts : public testing::TestWithParam<std::int32_t> {};
+
+TEST_P(ScanParts, FitOneDatagramEachAndComeTogetherAgain) {
+  const Scan scan = scan_of(GetParam());
+  ScanAssembler assembler;
+  std::optional<Scan> back;
+  for (const scan_t& part : to_messages(scan)) {
+    EXPECT_LE(part.getEncodedSize(), 64'000);
+    ASSERT_FALSE(back);
+    back = assembler.add(part);
+  }
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->utime, scan.utime);
+  EXPECT_EQ(back->sequence, scan.sequence);
+  EXPECT_EQ(back->duration_us, scan.duration_us);
+  EXPECT_EQ(back->missing_packets, scan.missing_packets);
+  ASSERT_EQ(back->points.size(), scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    ASSERT_EQ(back->points[i].position, scan.points[i].position);
+    ASSERT_EQ(back->points[i].dt_us, scan.points[i].dt_us);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, ScanParts, testing::Values(0, 1, 1080, 2900, 2901, 120'000));
+
+}  // namespace
+}  // namespace ignis::messages
