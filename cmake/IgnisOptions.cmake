@@ -11,6 +11,9 @@ set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 # Symbols stay small: -O2 with line tables is enough for profiles and backtraces.
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 
+# A process loads only the libraries that it calls: l1_driver knows of GTSAM's messages, not of GTSAM.
+add_link_options(LINKER:--as-needed)
+
 option(IGNIS_WARNINGS_AS_ERRORS "Treat warnings as errors" OFF)
 set(IGNIS_SANITIZERS "" CACHE STRING "Value for -fsanitize=, for example address,undefined")
 

@@ -32,7 +32,7 @@ struct FrontendSection {
 /// The whole configuration file. Every process reads the same one and uses its sections.
 struct IgnisConfig {
   DriverConfig driver;
-  Extrinsics extrinsics;
+  Extrinsics extrinsics = l1_extrinsics();
   FrontendSection frontend;
   BackendConfig backend;
   MapConfig map;

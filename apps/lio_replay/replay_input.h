@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/measurements.h"
+#include "common/trajectory_file.h"
+#include "messages/lcm_log.h"
+
+namespace ignis {
+
+/// What a log holds and what was lost of it.
+struct LogInventory {
+  std::map<std::string, std::int64_t> used;     ///< messages per channel that the replay reads
+  std::map<std::string, std::int64_t> ignored;  ///< messages per channel that it does not read
+  std::int64_t undecodable = 0;                 ///< on known channels: another type, or a damaged body
+  std::int64_t incomplete_scans = 0;            ///< scans of which a part is missing
+  std::int64_t missing_imu = 0;                 ///< by the running number
+  std::int64_t missing_scans = 0;               ///< by the running number
+  std::int64_t damaged_bytes = 0;               ///< of the file, in no whole record
+  Utime first_utime = 0;                        ///< [us] of the first measurement
+  Utime last_utime = 0;
+
+  [[nodiscard]] bool damaged() const { return undecodable > 0 || damaged_bytes > 0 || incomplete_scans > 0; }
+};
+
+/// The measurements of a log, in the order of their own stamps per channel: under load LCM records out of order.
+class ReplayInput {
+ public:
+  /// Indexes the log. Throws std::runtime_error when it is no log or holds no IMU or no scans.
+  explicit ReplayInput(const std::filesystem::path& file);
+
+  [[nodiscard]] const LogInventory& inventory() const { return inventory_; }
+  [[nodiscard]] const Trajectory& ground_truth() const { return ground_truth_; }
+
+  /// Calls the handlers with every measurement, in time order; stops early when `proceed` returns false.
+  void run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(const Scan&)>& on_scan,
+           const std::function<bool(Utime)>& proceed) const;
+
+ private:
+  struct Entry {
+    Utime utime = 0;
+    bool is_scan = false;
+    std::span<const std::byte> data;
+  };
+
+  void index(const messages::LogEvent& event);
+  void index_ground_truth(const messages::LogEvent& event);
+  void count_missing();
+
+  messages::LcmLog log_;
+  LogInventory inventory_;
+  std::vector<Entry> entries_;
+  Trajectory ground_truth_;
+};
+
+}  // namespace ignis

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay_output.h"
+
+#include <algorithm>
+#include <format>
+
+#include "common/file_output.h"
+#include "common/fingerprint.h"
+#include "map/map_export.h"
+
+namespace ignis {
+namespace {
+
+using config::Json;
+
+std::map<std::string, std::int64_t> scans_by_reason(const ReplayResult& result) {
+  std::map<std::string, std::int64_t> reasons;
+  for (const ScanStats& scan : result.scans) ++reasons[std::string(text(scan.reason))];
+  return reasons;
+}
+
+std::int64_t applied_scans(const ReplayResult& result) {
+  return std::ranges::count_if(result.scans, [](const ScanStats& scan) { return scan.applied(); });
+}
+
+double drive_seconds(const ReplayInput& input) {
+  return seconds_between(input.inventory().first_utime, input.inventory().last_utime);
+}
+
+void write_scan_stats(const std::filesystem::path& file, const ReplayResult& result) {
+  FileOutput output(file);
+  output.stream() << "utime,scan_sequence,applied,reason,points,matched,used,mean_innovation_m,mean_residual_m,"
+                     "correction_m,correction_rad,velocity_correction_m_s,observability_x,observability_y,"
+                     "observability_z,degenerate_directions,map_points\n";
+  for (const ScanStats& s : result.scans) {
+    output.stream() << std::format("{},{},{},\"{}\",{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{},{}\n",
+                                   s.utime, s.scan_sequence, s.applied() ? 1 : 0, text(s.reason), s.points, s.matched,
+                                   s.used, s.mean_innovation, s.mean_residual, s.correction_m, s.correction_rad,
+                                   s.velocity_correction, s.observability.x(), s.observability.y(),
+                                   s.observability.z(), s.degenerate_directions, s.map_points);
+  }
+  output.commit();
+}
+
+void write_loops(const std::filesystem::path& file, const ReplayResult& result) {
+  FileOutput output(file);
+  output.stream() << "utime,from_id,to_id,accepted,reason,candidates,passed,correction_m,correction_rad,"
+                     "mean_residual_m,matched_fraction\n";
+  for (const LoopResult& loop : result.loops) {
+    output.stream() << std::format("{},{},{},{},\"{}\",{},{},{:.6f},{:.6f},{:.6f},{:.4f}\n", loop.utime, loop.from_id,
+                                   loop.to_id, loop.accepted() ? 1 : 0, text(loop.reason), loop.candidates,
+                                   loop.passed, loop.correction_m, loop.correction_rad, loop.mean_residual,
+                                   loop.matched_fraction);
+  }
+  output.commit();
+}
+
+void write_text(const std::filesystem::path& file, const std::string& content) {
+  FileOutput output(file);
+  output.stream() << content;
+  output.commit();
+}
+
+Json timer_json(const StageTimer& timer) {
+  return {{"calls", timer.calls()},
+          {"total_ms", timer.total_ms()},
+          {"p50_ms", timer.quantile_ms(0.5)},
+          {"p99_ms", timer.quantile_ms(0.99)}};
+}
+
+double quantile(std::vector<double> values, double ratio) {
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(ratio * static_cast<double>(values.size() - 1))];
+}
+
+Json inventory_json(const LogInventory& inventory) {
+  return {{"used", inventory.used},
+          {"ignored", inventory.ignored},
+          {"undecodable", inventory.undecodable},
+          {"incomplete_scans", inventory.incomplete_scans},
+          {"missing_imu", inventory.missing_imu},
+          {"missing_scans", inventory.missing_scans},
+          {"damaged_bytes", inventory.damaged_bytes}};
+}
+
+Json report(const runtime::Application& application, const std::filesystem::path& log, const ReplayInput& input,
+            const ReplayPipeline& pipeline, const ReplayResult& result, const ReplayTiming& timing) {
+  const double seconds = drive_seconds(input);
+  const auto accepted = std::ranges::count_if(result.loops, [](const LoopResult& loop) { return loop.accepted(); });
+  Json json;
+  json["log"] = log.filename().string();
+  json["version"] = runtime::version();
+  json["config_hash"] = application.config_hash;
+  json["start"] = result.start;
+  json["duration_s"] = seconds;
+  json["input"] = inventory_json(input.inventory());
+  json["imu_samples"] = result.imu_samples;
+  json["imu_rejected"] = result.rejected_imu;
+  json["scans"] = result.scans.size();
+  json["scans_applied"] = applied_scans(result);
+  json["scans_by_reason"] = scans_by_reason(result);
+  json["keyframes"] = result.smoother.keyframes;
+  json["keyframes_without_imu"] = result.smoother.without_imu;
+  json["loops_accepted"] = accepted;
+  json["loops_kept"] = result.smoother.loops_kept;
+  json["loops_withdrawn"] = result.smoother.loops_withdrawn;
+  json["solver_rebuilds"] = result.smoother.solver_rebuilds;
+  json["voxels"] = {{"local", pipeline.voxels().level(0).size()},
+                    {"mid", pipeline.voxels().level(1).size()},
+                    {"coarse", pipeline.voxels().level(2).size()}};
+  json["trajectory_hash"] = trajectory_hash(result);
+  json["map_hash"] = pipeline.voxels().fingerprint();
+  json["timing"] = {{"wall_s", timing.wall_s},
+                    {"real_time_factor", timing.wall_s > 0.0 ? seconds / timing.wall_s : 0.0},
+                    {"scan_p50_ms", quantile(result.scan_times_ms, 0.5)},
+                    {"scan_p99_ms", quantile(result.scan_times_ms, 0.99)},
+                    {"frontend", timer_json(pipeline.frontend_timer())},
+                    {"backend", timer_json(pipeline.backend_timer())},
+                    {"map", timer_json(pipeline.map_timer())}};
+  return json;
+}
+
+/// Ground truth on the stamps of the odometry, so that all trajectories of a folder share them.
+Trajectory sampled(const Trajectory& truth, const Trajectory& stamps) {
+  Trajectory rows;
+  for (const StampedPose& stamp : stamps) {
+    const auto next = std::ranges::lower_bound(truth, stamp.utime, {}, &StampedPose::utime);
+    if (next == truth.end() || (next == truth.begin() && next->utime != stamp.utime)) continue;
+    if (next->utime == stamp.utime) {
+      rows.push_back(*next);
+      continue;
+    }
+    const StampedPose& before = *std::prev(next);
+    const double ratio = seconds_between(before.utime, stamp.utime) / seconds_between(before.utime, next->utime);
+    rows.push_back({stamp.utime, interpolate(before.T_world_body, next->T_world_body, ratio)});
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::string trajectory_hash(const ReplayResult& result) {
+  Fingerprint fingerprint;
+  for (const Trajectory* trajectory : {&result.odometry, &result.smoothed}) {
+    for (const StampedPose& row : *trajectory) {
+      fingerprint.add(row.utime);
+      for (const double value : row.T_world_body.translation) fingerprint.add(value);
+      for (const double value : row.T_world_body.rotation.coeffs()) fingerprint.add(value);
+    }
+  }
+  return fingerprint.text();
+}
+
+std::filesystem::path write_results(const std::filesystem::path& folder, const runtime::Application& application,
+                                    const std::filesystem::path& log, const ReplayInput& input,
+                                    const ReplayPipeline& pipeline, const ReplayResult& result,
+                                    const ReplayTiming& timing) {
+  write_tum(folder / "eskf.tum", result.odometry);
+  write_tum(folder / "smoothed.tum", result.smoothed);
+  if (!input.ground_truth().empty()) {
+    write_tum(folder / "ground_truth.tum", sampled(input.ground_truth(), result.odometry));
+  }
+  write_pose_graph(folder / "keyframes.g2o", result.graph);
+  write_pcd(folder / "map.pcd", pipeline.voxels());
+  write_ply(folder / "map.ply", pipeline.voxels());
+  write_scan_stats(folder / "scan_stats.csv", result);
+  write_loops(folder / "loops.csv", result);
+  write_text(folder / "config.json", print_config(application.config));
+  const std::filesystem::path file = folder / "report.json";
+  write_text(file, report(application, log, input, pipeline, result, timing).dump(2) + '\n');
+  return file;
+}
+
+std::string summary(const ReplayInput& input, const ReplayResult& result, const ReplayTiming& timing) {
+  const double seconds = drive_seconds(input);
+  std::string text = std::format("start:      {}\n", result.start);
+  text += std::format("drive:      {:.1f} s, {} IMU samples, {} scans\n", seconds, result.imu_samples,
+                      result.scans.size());
+  text += std::format("scans:      {} applied", applied_scans(result));
+  for (const auto& [reason, count] : scans_by_reason(result)) {
+    if (reason != ignis::text(ScanReason::kApplied)) text += std::format(", {} {}", count, reason);
+  }
+  text += std::format("\ngraph:      {} keyframes, {} loops kept, {} withdrawn\n", result.smoother.keyframes,
+                      result.smoother.loops_kept, result.smoother.loops_withdrawn);
+  text += std::format("time:       {:.2f} s, {:.1f} times real time; a scan takes {:.2f} ms (median), {:.2f} ms (p99)\n",
+                      timing.wall_s, seconds / std::max(timing.wall_s, 1e-9), quantile(result.scan_times_ms, 0.5),
+                      quantile(result.scan_times_ms, 0.99));
+  text += std::format("trajectory: {}\n", trajectory_hash(result));
+  const LogInventory& inventory = input.inventory();
+  if (inventory.missing_imu + inventory.missing_scans > 0) {
+    text += std::format("missing:    {} IMU samples and {} scans by their running numbers\n", inventory.missing_imu,
+                        inventory.missing_scans);
+  }
+  if (inventory.damaged()) {
+    text += std::format("damaged:    {} bytes in no whole record, {} messages undecodable, {} scans incomplete\n",
+                        inventory.damaged_bytes, inventory.undecodable, inventory.incomplete_scans);
+  }
+  return text;
+}
+
+}  // namespace ignis

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay_pipeline.h"
+
+namespace ignis {
+namespace {
+
+BackendConfig with_loops(BackendConfig config, bool use_loops) {
+  config.use_loop_closing = config.use_loop_closing && use_loops;
+  return config;
+}
+
+}  // namespace
+
+ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops)
+    : lio_(config.frontend.filter),
+      smoother_(with_loops(config.backend, use_loops), config.frontend.loop_gates),
+      map_(config.map) {}
+
+void ReplayPipeline::add_imu(const ImuSample& sample) {
+  const ImuResult imu = frontend_timer_.time([&] { return lio_.add_imu(sample); });
+  ++result_.imu_samples;
+  if (imu.fault != ImuFault::kNone) ++result_.rejected_imu[std::string(text(imu.fault))];
+  for (const ScanResult& scan : imu.scans) take(scan, frontend_timer_.newest_ms());
+}
+
+void ReplayPipeline::add_scan(const Scan& scan) {
+  const std::vector<ScanResult> scans = frontend_timer_.time([&] { return lio_.add_scan(scan); });
+  for (const ScanResult& each : scans) take(each, frontend_timer_.newest_ms());
+}
+
+void ReplayPipeline::take(const ScanResult& scan, double milliseconds) {
+  result_.scans.push_back(scan.stats);
+  result_.scan_times_ms.push_back(milliseconds);
+  if (!scan.has_state) return;
+  result_.odometry.push_back({scan.state.utime, scan.state.T_odom_body});
+  if (scan.keyframe) take_keyframe(*scan.keyframe);
+  map_timer_.time([&] { return map_.insert_scan(scan.cloud, scan.state.T_odom_body); });
+}
+
+void ReplayPipeline::take_keyframe(const Keyframe& sent) {
+  for (const keyframe_t& part : messages::to_messages(sent)) {
+    const std::optional<Keyframe> keyframe = assembler_.add(part);
+    if (!keyframe) continue;
+    map_.add_keyframe(*keyframe);
+    const SmootherUpdate update = backend_timer_.time([&] { return smoother_.add_keyframe(*keyframe); });
+    keyframes_[keyframe->id] = {keyframe->state.utime, keyframe->state.T_odom_body, keyframe->state.T_odom_body};
+    if (update.loop) result_.loops.push_back(*update.loop);
+    result_.loops.insert(result_.loops.end(), update.withdrawn.begin(), update.withdrawn.end());
+    if (update.accepted()) correct_map(update);
+  }
+}
+
+void ReplayPipeline::correct_map(const SmootherUpdate& update) {
+  if (update.loop && update.loop->accepted()) map_.add_loop(update.loop->from_id, update.loop->to_id);
+  for (const LoopResult& loop : update.withdrawn) map_.remove_loop(loop.from_id, loop.to_id);
+  std::vector<CorrectedPose> poses;
+  poses.reserve(update.moved.size());
+  for (const KeyframePose& pose : update.moved) poses.push_back({pose.id, pose.T_map_body});
+  map_.correct(update.T_map_odom, poses);
+  if (map_.needs_rebuild()) rebuild_map();
+}
+
+void ReplayPipeline::rebuild_map() {
+  map_timer_.time([&] {
+    const RebuildJob job = map_.begin_rebuild();
+    map_.finish_rebuild(rebuild(job));
+  });
+}
+
+ReplayResult ReplayPipeline::finish() {
+  rebuild_map();
+  std::vector<KeyframeCorrection> corrections;
+  for (const KeyframePose& pose : smoother_.all_poses()) {
+    KeyframeCorrection& keyframe = keyframes_.at(pose.id);
+    keyframe.T_map_body = pose.T_map_body;
+    corrections.push_back(keyframe);
+  }
+  result_.smoothed = corrected_trajectory(result_.odometry, corrections);
+  result_.graph = smoother_.pose_graph();
+  result_.smoother = smoother_.stats();
+  result_.start = lio_.status().text;
+  return std::move(result_);
+}
+
+}  // namespace ignis

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "backend/corrected_trajectory.h"
+#include "backend/smoother.h"
+#include "frontend/lio.h"
+#include "map/live_map.h"
+#include "messages/keyframe_messages.h"
+#include "runtime/ignis_config.h"
+#include "stage_timer.h"
+
+namespace ignis {
+
+/// Everything that a replay produces, before it becomes files.
+struct ReplayResult {
+  std::vector<ScanStats> scans;
+  std::vector<double> scan_times_ms;  ///< wall time of each scan in the front end
+  std::vector<LoopResult> loops;
+  Trajectory odometry;                ///< one row per scan, frame odom
+  Trajectory smoothed;                ///< on the same stamps, frame map
+  PoseGraph graph;
+  SmootherStats smoother;
+  std::string start;                  ///< what the front end says about its start
+  std::int64_t imu_samples = 0;
+  std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
+};
+
+/// All cores in one process. Keyframes pass through their message form, so that they carry the same rounding as on the
+/// bus and a replay equals the live run. Newest session only: a reset of the front end begins a new graph and map.
+class ReplayPipeline {
+ public:
+  ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops);
+
+  void add_imu(const ImuSample& sample);
+  void add_scan(const Scan& scan);
+
+  /// Places everything at its final pose. Call once, at the end.
+  [[nodiscard]] ReplayResult finish();
+
+  /// The map of the drive, rebuilt from the final poses.
+  [[nodiscard]] const ThreeLevelMap& voxels() const { return map_.voxels(); }
+
+  [[nodiscard]] const StageTimer& frontend_timer() const { return frontend_timer_; }
+  [[nodiscard]] const StageTimer& backend_timer() const { return backend_timer_; }
+  [[nodiscard]] const StageTimer& map_timer() const { return map_timer_; }
+
+ private:
+  void take(const ScanResult& scan, double milliseconds);
+  void take_keyframe(const Keyframe& keyframe);
+  void correct_map(const SmootherUpdate& update);
+  void rebuild_map();
+
+  Lio lio_;
+  Smoother smoother_;
+  LiveMap map_;
+  messages::KeyframeAssembler assembler_;
+  std::map<std::int32_t, KeyframeCorrection> keyframes_;
+  ReplayResult result_;
+  StageTimer frontend_timer_;
+  StageTimer backend_timer_;
+  StageTimer map_timer_;
+};
+
+}  // namespace ignis

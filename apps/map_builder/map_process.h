@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <future>
+#include <map>
+#include <optional>
+
+#include "map/live_map.h"
+#include "map_builder/hud.h"
+#include "map_builder/view_server.h"
+#include "messages/graph_messages.h"
+#include "messages/keyframe_messages.h"
+#include "messages/odometry_messages.h"
+#include "runtime/lcm_link.h"
+
+namespace ignis {
+
+/// The map_builder process: bus in, map and view out. The caller's thread handles messages and owns the map; the server
+/// has its own thread, and so has a rebuild, whose result is taken over between two messages.
+class MapProcess {
+ public:
+  MapProcess(const runtime::Application& application, const runtime::HmiConfig& hmi);
+
+  /// Serves until a stop is requested.
+  void run();
+
+  [[nodiscard]] const LiveMap& map() const { return map_; }
+  [[nodiscard]] std::string address() const { return server_.address(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void subscribe(const runtime::LcmConfig& lcm);
+  [[nodiscard]] bool accept_session(std::int32_t session);
+  void on_cloud(const messages::PosedCloud& cloud);
+  void on_keyframe(const Keyframe& keyframe);
+  void on_revision(const messages::GraphRevision& revision);
+  void on_loop(const loop_result_t& loop);
+
+  void start_or_finish_rebuild();
+  void send_frames();
+  void send_hud();
+  void report();
+  void request_missing_keyframes();
+  void update_status();
+
+  MapConfig map_config_;
+  runtime::LcmLink link_;
+  ViewServer server_;
+  LiveMap map_;
+  messages::CloudAssembler clouds_;
+  messages::KeyframeAssembler keyframes_;
+  messages::RevisionAssembler revisions_;
+  std::vector<const runtime::ReceiverCounts*> receivers_;
+  HudData hud_;
+  Clock::time_point last_state_{};
+  Clock::duration frame_period_;
+  std::optional<std::int32_t> session_;
+  int resets_ = 0;
+  bool map_changed_ = true;
+  std::int64_t refused_clouds_ = 0;
+  std::int32_t graph_keyframes_ = 0;
+  std::map<std::int32_t, int> request_counts_;
+  std::int32_t request_sequence_ = 0;
+  struct Rebuilt {
+    ThreeLevelMap map;
+    double milliseconds;
+  };
+  // Last, so that a rebuild under way has ended before anything else goes.
+  std::future<Rebuilt> rebuild_;
+};
+
+}  // namespace ignis

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_builder/request_rules.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include <boost/asio/ip/address.hpp>
+
+namespace ignis {
+namespace {
+
+std::string_view trim(std::string_view text) {
+  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  return text;
+}
+
+bool same_ignoring_case(std::string_view a, std::string_view b) {
+  return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+/// The host without its port, and without the brackets of an IPv6 address.
+std::string_view name_of(std::string_view host) {
+  if (host.starts_with('[')) return host.substr(1, std::min(host.find(']'), host.size()) - 1);
+  return host.substr(0, host.find(':'));
+}
+
+std::string_view host_of_origin(std::string_view origin) {
+  const std::size_t scheme_end = origin.find("://");
+  return scheme_end == std::string_view::npos ? std::string_view{} : origin.substr(scheme_end + 3);
+}
+
+}  // namespace
+
+bool host_is_allowed(std::string_view host, std::string_view allowed_origin) {
+  const std::string_view name = name_of(host);
+  if (same_ignoring_case(name, "localhost")) return true;
+  boost::system::error_code error;
+  boost::asio::ip::make_address(std::string(name), error);
+  if (!error) return true;
+  return !host.empty() && same_ignoring_case(host, host_of_origin(allowed_origin));
+}
+
+bool origin_is_allowed(std::string_view origin, std::string_view host, std::string_view allowed_origin) {
+  if (origin.empty()) return true;
+  if (!allowed_origin.empty() && same_ignoring_case(origin, allowed_origin)) return true;
+  return same_ignoring_case(origin, "http://" + std::string(host));
+}
+
+bool offers_protocol(std::string_view header, std::string_view protocol) {
+  while (true) {
+    const std::size_t comma = header.find(',');
+    if (trim(header.substr(0, comma)) == protocol) return true;
+    if (comma == std::string_view::npos) return false;
+    header.remove_prefix(comma + 1);
+  }
+}
+
+}  // namespace ignis

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_builder/view_server.h"
+
+#include <algorithm>
+#include <chrono>
+#include <format>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+
+#include "map/stream_encoding.h"
+#include "map_builder/listening_socket.h"
+#include "map_builder/request_rules.h"
+#include "map_builder/web_files.h"
+
+namespace ignis {
+namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+
+constexpr auto kNoThrow = net::as_tuple(net::use_awaitable);
+constexpr std::chrono::seconds kRequestTimeout{5};
+constexpr std::chrono::seconds kIdleTimeout{10};
+constexpr std::chrono::milliseconds kAcceptPause{100};
+constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
+constexpr std::size_t kMaxInboundBytes = 64 * 1024;
+constexpr int kSpareConnections = 16;  // beside the viewers: pages and status requests
+constexpr char kStreamPath[] = "/ws/lio_map";
+constexpr char kStatusPath[] = "/api/status";
+
+http::response<http::string_body> make_response(http::status status, std::string_view type, std::string_view body) {
+  http::response<http::string_body> response(status, 11);
+  response.set(http::field::server, "ignis map_builder");
+  response.set(http::field::content_type, type);
+  response.set(http::field::cache_control, "no-cache");
+  response.set("X-Content-Type-Options", "nosniff");
+  response.set("Content-Security-Policy", "default-src 'self'; frame-ancestors 'none'");
+  response.body() = body;
+  response.prepare_payload();
+  return response;
+}
+
+http::response<http::string_body> refusal(http::status status, std::string_view sentence) {
+  return make_response(status, "text/plain; charset=utf-8", std::string(sentence) + '\n');
+}
+
+/// Stops counting a connection when its coroutine ends, however it ends.
+class ConnectionCount {
+ public:
+  explicit ConnectionCount(int& count) : count_(count) { ++count_; }
+  ~ConnectionCount() { --count_; }
+  ConnectionCount(const ConnectionCount&) = delete;
+  ConnectionCount& operator=(const ConnectionCount&) = delete;
+
+ private:
+  int& count_;
+};
+
+}  // namespace
+
+ViewServer::ViewServer(const runtime::HmiConfig& config)
+    : config_(config), acceptor_(open_listening_socket(context_, config.address, config.port)) {
+  net::co_spawn(context_, accept_loop(), net::detached);
+  thread_ = std::thread([this] { context_.run(); });
+}
+
+ViewServer::~ViewServer() {
+  context_.stop();
+  thread_.join();
+}
+
+std::string ViewServer::address() const {
+  const auto endpoint = acceptor_.local_endpoint();
+  const std::string host = endpoint.address().to_string();
+  return std::format("http://{}:{}/", endpoint.address().is_v6() ? '[' + host + ']' : host, endpoint.port());
+}
+
+std::set<double> ViewServer::view_radii() const {
+  const std::lock_guard lock(radii_mutex_);
+  return radii_;
+}
+
+void ViewServer::update_radii() {
+  std::set<double> radii;
+  for (const auto& client : clients_) radii.insert(client->view_radius());
+  const std::lock_guard lock(radii_mutex_);
+  radii_ = std::move(radii);
+}
+
+void ViewServer::publish_frames(std::map<double, SharedBytes> frames) {
+  net::post(context_, [this, frames = std::move(frames)] {
+    for (const auto& client : clients_) {
+      const auto found = frames.find(client->view_radius());
+      if (found != frames.end()) client->offer_frame(found->second);
+    }
+  });
+}
+
+void ViewServer::publish_status(std::string hud_json) {
+  net::post(context_, [this, text = std::make_shared<const std::string>(std::move(hud_json))] {
+    for (const auto& client : clients_) client->offer_status(text);
+  });
+}
+
+void ViewServer::set_api_status(std::string json) {
+  net::post(context_, [this, text = std::make_shared<const std::string>(std::move(json))] { api_status_ = text; });
+}
+
+net::awaitable<void> ViewServer::accept_loop() {
+  while (acceptor_.is_open()) {
+    auto [error, socket] = co_await acceptor_.async_accept(kNoThrow);
+    if (!error) {
+      net::co_spawn(context_, serve_connection(std::move(socket)), net::detached);
+      continue;
+    }
+    // Out of descriptors: wait until a viewer leaves instead of spinning.
+    net::steady_timer pause(context_, kAcceptPause);
+    co_await pause.async_wait(kNoThrow);
+  }
+}
+
+net::awaitable<void> ViewServer::serve_connection(Socket socket) {
+  const ConnectionCount counted(connections_);
+  beast::tcp_stream stream(std::move(socket));
+  if (connections_ > config_.max_clients + kSpareConnections) {
+    stream.expires_after(kRequestTimeout);
+    const Response response = refusal(http::status::service_unavailable, "too many connections; try again later");
+    co_await http::async_write(stream, response, kNoThrow);
+    co_return;
+  }
+  co_await serve_requests(stream);
+}
+
+net::awaitable<void> ViewServer::serve_requests(beast::tcp_stream& stream) {
+  beast::flat_buffer buffer;
+  bool keep_alive = true;
+  while (keep_alive) {
+    http::request_parser<http::empty_body> parser;
+    parser.header_limit(kMaxHeaderBytes);
+    stream.expires_after(kRequestTimeout);
+    const auto [error, bytes] = co_await http::async_read(stream, buffer, parser, kNoThrow);
+    const bool is_malformed = error && error.category() == http::make_error_code(http::error::bad_method).category() &&
+                              error != http::error::end_of_stream && error != http::error::partial_message;
+    if (error && !is_malformed) co_return;
+    bool refused = is_malformed;
+    Response response = refusal(http::status::bad_request, "the request is malformed or has a body");
+    if (!is_malformed && websocket::is_upgrade(parser.get())) {
+      response = refuse_upgrade(parser.get(), refused);
+      if (!refused) {
+        co_await serve_viewer(std::move(stream), parser.release());
+        co_return;
+      }
+    } else if (!is_malformed) {
+      response = answer(parser.get());
+    }
+    keep_alive = !refused && parser.keep_alive();
+    response.keep_alive(keep_alive);
+    http::response_serializer<http::string_body> serializer(response);
+    stream.expires_after(kIdleTimeout);
+    // A HEAD request gets the same header and no body.
+    const auto [write_error, written] =
+        !is_malformed && parser.get().method() == http::verb::head
+            ? co_await http::async_write_header(stream, serializer, kNoThrow)
+            : co_await http::async_write(stream, serializer, kNoThrow);
+    if (write_error) co_return;
+  }
+  beast::error_code ignored;
+  stream.socket().shutdown(net::ip::tcp::socket::shutdown_send, ignored);
+}
+
+ViewServer::Response ViewServer::answer(const Request& request) const {
+  if (!host_is_allowed(request[http::field::host], config_.allowed_origin)) {
+    return refusal(http::status::forbidden, "open the view by IP address or as localhost");
+  }
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    return refusal(http::status::method_not_allowed, "only GET is served");
+  }
+  if (request.target() == kStatusPath) return make_response(http::status::ok, "application/json", *api_status_);
+  if (request.target() == kStreamPath) return refusal(http::status::upgrade_required, "this is a WebSocket");
+  const std::string_view target = request.target().substr(0, request.target().find('?'));
+  const auto files = web_files();
+  const auto file = std::ranges::find(files, target, &WebFile::path);
+  if (file == files.end()) return refusal(http::status::not_found, "no such page");
+  return make_response(http::status::ok, file->content_type, file->content);
+}
+
+ViewServer::Response ViewServer::refuse_upgrade(const Request& request, bool& refused) const {
+  refused = true;
+  const std::string_view host = request[http::field::host];
+  if (request.target() != kStreamPath) return refusal(http::status::not_found, "no such stream");
+  if (!host_is_allowed(host, config_.allowed_origin) ||
+      !origin_is_allowed(request[http::field::origin], host, config_.allowed_origin)) {
+    return refusal(http::status::forbidden, "this origin may not open the stream; see hmi.allowed_origin");
+  }
+  if (!offers_protocol(request[http::field::sec_websocket_protocol], kStreamProtocol)) {
+    return refusal(http::status::bad_request, std::format("offer the subprotocol {}", kStreamProtocol));
+  }
+  if (std::ssize(clients_) >= config_.max_clients) {
+    return refusal(http::status::service_unavailable, "all viewer places are taken; try again later");
+  }
+  refused = false;
+  return {};
+}
+
+net::awaitable<void> ViewServer::serve_viewer(beast::tcp_stream stream, Request request) {
+  stream.expires_never();  // the WebSocket has its own timers
+  ViewClient::Stream upgraded(std::move(stream));
+  upgraded.set_option(websocket::stream_base::timeout{kRequestTimeout, kIdleTimeout, true});
+  upgraded.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+    response.set(http::field::sec_websocket_protocol, kStreamProtocol);
+  }));
+  upgraded.read_message_max(kMaxInboundBytes);
+  const auto client = std::make_shared<ViewClient>(std::move(upgraded), config_.max_view_radius_m, counters_, [this] {
+    update_radii();
+    view_changed_ = true;
+  });
+  // The place is taken before the handshake ends, so that nobody slips past the limit meanwhile.
+  clients_.insert(client);
+  client_count_ = static_cast<int>(clients_.size());
+  update_radii();
+  co_await client->serve(request);
+  clients_.erase(client);
+  client_count_ = static_cast<int>(clients_.size());
+  update_radii();
+}
+
+}  // namespace ignis

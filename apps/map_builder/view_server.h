@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/string_body.hpp>
+
+#include "map_builder/view_client.h"
+#include "runtime/hmi_config.h"
+
+namespace ignis {
+
+/// HTTP and WebSocket server of the browser view: `GET /` and its files from the built-in table, `GET /api/status`,
+/// `WS /ws/lio_map` with the subprotocol of stream_encoding.h. Runs on one thread of its own; the public calls may come
+/// from any other thread and never wait for a viewer.
+class ViewServer {
+ public:
+  /// Opens the port. Throws runtime::UserError when it cannot.
+  explicit ViewServer(const runtime::HmiConfig& config);
+  ~ViewServer();
+  ViewServer(const ViewServer&) = delete;
+  ViewServer& operator=(const ViewServer&) = delete;
+
+  /// Where the view is served, such as http://127.0.0.1:8080/
+  [[nodiscard]] std::string address() const;
+
+  /// The view radii that the connected viewers ask for [m], each once.
+  [[nodiscard]] std::set<double> view_radii() const;
+
+  /// True once after a viewer came or changed its radius: it waits for a frame.
+  [[nodiscard]] bool take_view_changed() { return view_changed_.exchange(false); }
+
+  /// Hands each viewer the frame of its radius.
+  void publish_frames(std::map<double, SharedBytes> frames);
+
+  /// Hands every viewer this JSON text.
+  void publish_status(std::string hud_json);
+
+  /// What GET /api/status answers from now on.
+  void set_api_status(std::string json);
+
+  [[nodiscard]] int clients() const { return client_count_; }
+  [[nodiscard]] const StreamCounters& counters() const { return counters_; }
+
+ private:
+  using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+  using Response = boost::beast::http::response<boost::beast::http::string_body>;
+  using Socket = boost::asio::ip::tcp::socket;
+
+  boost::asio::awaitable<void> accept_loop();
+  boost::asio::awaitable<void> serve_connection(Socket socket);
+  boost::asio::awaitable<void> serve_requests(boost::beast::tcp_stream& stream);
+  boost::asio::awaitable<void> serve_viewer(boost::beast::tcp_stream stream, Request request);
+  [[nodiscard]] Response answer(const Request& request) const;
+  [[nodiscard]] Response refuse_upgrade(const Request& request, bool& refused) const;
+  void update_radii();
+
+  runtime::HmiConfig config_;
+  StreamCounters counters_;
+  std::atomic<int> client_count_ = 0;
+  std::atomic<bool> view_changed_ = false;
+  mutable std::mutex radii_mutex_;
+  std::set<double> radii_;
+  // Below: the server's thread only.
+  std::set<std::shared_ptr<ViewClient>> clients_;
+  int connections_ = 0;
+  SharedBytes api_status_ = std::make_shared<const std::string>("{}");
+  // The context goes before what its coroutines refer to, and after the sockets in it.
+  boost::asio::io_context context_{1};
+  boost::asio::ip::tcp::acceptor acceptor_;
+  std::thread thread_;
+};
+
+}  // namespace ignis

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "backend/incremental_solver.h"
+#include "backend/loop_matcher.h"
+#include "backend/preintegration.h"
+#include "common/config_fields.h"
+
+namespace ignis {
+
+/// Parameters of the back end, section `backend` of the configuration. The thresholds of the loop closer itself stand
+/// in LoopGates.
+struct BackendConfig {
+  ImuNoise imu;
+  SolverConfig solver;
+  LoopMatcherConfig matcher;
+
+  // First keyframe. The graph does not estimate gravity, so its tilt must be honest.
+  double prior_tilt_deg = 1.5;
+  double prior_yaw_rad = 1e-3;
+  double prior_position_m = 1e-3;
+  double prior_velocity = 0.5;
+  double prior_gyro_bias = 0.005;
+  double prior_accel_bias = 0.1;
+
+  // Relative pose from scan matching.
+  double scan_information_scale = 0.2;
+  double odometry_floor_m = 0.01;
+  double odometry_floor_rad = 0.001;
+
+  // What links two keyframes when the IMU does not.
+  double loose_position_m = 0.5;
+  double loose_rotation_rad = 0.05;
+  double loose_velocity = 1.0;
+
+  double stationary_velocity = 0.02;
+
+  // Loops.
+  bool use_loop_closing = true;
+  int loop_min_spacing = 2;
+  int loop_max_candidates = 3;
+  double loop_noise_inflation = 5.0;
+  double loop_floor_m = 0.02;
+  double loop_floor_rad = 0.003;
+  double loop_consistency_probability = 0.999;
+
+  void visit_fields(this auto& self, auto& visit) {
+    visit.section("imu", self.imu, "noise of the inertial unit as the graph assumes it");
+    visit.section("solver", self.solver, "when iSAM2 linearises anew");
+    visit.section("matcher", self.matcher, "scan match that confirms a loop");
+    visit.number("prior_tilt_deg", self.prior_tilt_deg, {0.01, 45.0}, "deg",
+                 "sigma of roll and pitch of the first keyframe");
+    visit.number("prior_yaw_rad", self.prior_yaw_rad, {1e-6, 1.0}, "rad", "sigma of its heading");
+    visit.number("prior_position_m", self.prior_position_m, {1e-6, 10.0}, "m", "sigma of its position");
+    visit.number("prior_velocity", self.prior_velocity, {1e-3, 100.0}, "m/s", "smallest sigma of its velocity");
+    visit.number("prior_gyro_bias", self.prior_gyro_bias, {1e-6, 1.0}, "rad/s", "sigma of its gyro bias");
+    visit.number("prior_accel_bias", self.prior_accel_bias, {1e-5, 5.0}, "m/s^2", "sigma of its accelerometer bias");
+    visit.number("scan_information_scale", self.scan_information_scale, {1e-6, 1.0}, "1",
+                 "factor on the information of scan matching: residuals of one wall are not independent");
+    visit.number("odometry_floor_m", self.odometry_floor_m, {1e-6, 1.0}, "m",
+                 "sigma of an independent position error per keyframe");
+    visit.number("odometry_floor_rad", self.odometry_floor_rad, {1e-7, 1.0}, "rad",
+                 "sigma of an independent attitude error per keyframe");
+    visit.number("loose_position_m", self.loose_position_m, {1e-3, 100.0}, "m",
+                 "sigma of the odometry between keyframes without IMU");
+    visit.number("loose_rotation_rad", self.loose_rotation_rad, {1e-4, 3.0}, "rad", "the same, attitude");
+    visit.number("loose_velocity", self.loose_velocity, {1e-3, 100.0}, "m/s", "the same, velocity");
+    visit.number("stationary_velocity", self.stationary_velocity, {1e-4, 1.0}, "m/s",
+                 "sigma of the zero velocity of a keyframe that stood still");
+    visit.flag("use_loop_closing", self.use_loop_closing, "false: smoothing only");
+    visit.integer("loop_min_spacing", self.loop_min_spacing, {1, 1000}, "keyframes",
+                  "fewest keyframes from one accepted loop to the next search");
+    visit.integer("loop_max_candidates", self.loop_max_candidates, {1, 50}, "1",
+                  "candidates that are matched per keyframe");
+    visit.number("loop_noise_inflation", self.loop_noise_inflation, {1.0, 1000.0}, "1",
+                 "factor on the variance of a match: its residuals are not independent");
+    visit.number("loop_floor_m", self.loop_floor_m, {1e-6, 1.0}, "m",
+                 "sigma of an independent position error of a loop");
+    visit.number("loop_floor_rad", self.loop_floor_rad, {1e-7, 1.0}, "rad",
+                 "sigma of an independent attitude error of a loop");
+    visit.number("loop_consistency_probability", self.loop_consistency_probability, {0.5, 0.9999999}, "1",
+                 "a loop is withdrawn when its chi-square exceeds this quantile");
+  }
+};
+
+}  // namespace ignis

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/incremental_solver.h"
+
+#include <gtsam/geometry/Pose3.h>
+#include <gtsam/inference/Symbol.h>
+#include <gtsam/linear/linearExceptions.h>
+#include <gtsam/nonlinear/ISAM2.h>
+
+#include <cmath>
+#include <format>
+
+#include "common/config_check.h"
+
+namespace ignis {
+namespace {
+
+gtsam::ISAM2Params parameters(const SolverConfig& config) {
+  gtsam::FastMap<char, gtsam::Vector> thresholds;
+  gtsam::Vector6 pose;
+  pose << gtsam::Vector3::Constant(config.relinearize_rotation_rad),
+      gtsam::Vector3::Constant(config.relinearize_position_m);
+  thresholds['x'] = pose;
+  thresholds['v'] = gtsam::Vector3::Constant(config.relinearize_velocity);
+  thresholds['b'] = gtsam::Vector6::Constant(config.relinearize_bias);
+  gtsam::ISAM2Params params;
+  params.relinearizeThreshold = thresholds;
+  params.relinearizeSkip = config.relinearize_skip;
+  params.findUnusedFactorSlots = false;  // factor indices must stay what they were
+  return params;
+}
+
+std::string name_of(gtsam::Key key) { return std::string(gtsam::Symbol(key)); }
+
+}  // namespace
+
+struct IncrementalSolver::Impl {
+  explicit Impl(const SolverConfig& config) : params(parameters(config)), isam(params) {}
+
+  /// Why the batch must not reach GTSAM, or an empty text.
+  [[nodiscard]] std::string problem(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news) const {
+    if (!broken.empty()) return broken;
+    for (const gtsam::Key key : news.keys()) {
+      if (isam.valueExists(key)) return std::format("variable {} exists already", name_of(key));
+    }
+    for (const auto& factor : batch) {
+      gtsam::Values around;
+      for (const gtsam::Key key : factor->keys()) {
+        if (news.exists(key)) {
+          around.insert(key, news.at(key));
+        } else if (isam.valueExists(key)) {
+          around.insert(key, isam.calculateEstimate(key));
+        } else {
+          return std::format("a factor names the unknown variable {}", name_of(key));
+        }
+      }
+      if (!std::isfinite(factor->error(around))) {
+        return std::format("a factor on {} has an error that is not finite", name_of(factor->keys().front()));
+      }
+    }
+    return {};
+  }
+
+  /// One update of iSAM2; the reason if it failed.
+  [[nodiscard]] std::string update(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news,
+                                   const gtsam::FactorIndices& removed, gtsam::FactorIndices& indices) {
+    fresh = false;
+    try {
+      indices = isam.update(batch, news, removed).newFactorsIndices;
+      for (const auto& [key, delta] : isam.getDelta()) {
+        if (!delta.allFinite()) return std::format("the solution at {} is not finite", name_of(key));
+      }
+    } catch (const gtsam::IndeterminantLinearSystemException& e) {
+      return std::format("the graph is undetermined near {}", name_of(e.nearbyVariable()));
+    } catch (const std::exception& e) {
+      return std::format("the solver threw: {}", e.what());
+    }
+    return {};
+  }
+
+  /// A new iSAM2 from the living factors at the last good solution. Should even that fail, the solver keeps its last
+  /// solution and refuses everything from then on.
+  void rebuild() {
+    ++rebuilds;
+    isam = gtsam::ISAM2(params);
+    gtsam::NonlinearFactorGraph living;
+    std::vector<FactorId> ids;
+    for (FactorId id = 0; id < factors.size(); ++id) {
+      if (!factors[id]) continue;
+      living.push_back(factors[id]);
+      ids.push_back(id);
+    }
+    gtsam::FactorIndices indices;
+    if (const std::string failure = update(living, values, {}, indices); !failure.empty()) {
+      broken = "the graph cannot be rebuilt: " + failure;
+      fresh = true;
+      return;
+    }
+    for (std::size_t i = 0; i < ids.size(); ++i) isam_index[ids[i]] = indices[i];
+  }
+
+  const gtsam::Values& estimate() {
+    if (!fresh) {
+      values = isam.calculateEstimate();
+      fresh = true;
+    }
+    return values;
+  }
+
+  gtsam::ISAM2Params params;
+  gtsam::ISAM2 isam;
+  std::vector<gtsam::NonlinearFactor::shared_ptr> factors;  ///< by FactorId; empty when removed
+  std::vector<std::size_t> isam_index;                      ///< by FactorId
+  gtsam::Values values;                                     ///< last solution that was asked for, and what came since
+  bool fresh = true;                                        ///< `values` is the current solution
+  int rebuilds = 0;
+  std::string broken;  ///< why nothing is accepted any more; empty while all is well
+};
+
+IncrementalSolver::IncrementalSolver(const SolverConfig& config) {
+  config::require_valid(config, "backend.solver");
+  impl_ = std::make_unique<Impl>(config);
+}
+
+IncrementalSolver::~IncrementalSolver() = default;
+IncrementalSolver::IncrementalSolver(IncrementalSolver&&) noexcept = default;
+IncrementalSolver& IncrementalSolver::operator=(IncrementalSolver&&) noexcept = default;
+
+SolverOutcome IncrementalSolver::add(const gtsam::NonlinearFactorGraph& factors, const gtsam::Values& values) {
+  SolverOutcome outcome;
+  outcome.reason = impl_->problem(factors, values);
+  if (!outcome.reason.empty()) return outcome;
+  gtsam::FactorIndices indices;
+  outcome.reason = impl_->update(factors, values, {}, indices);
+  if (!outcome.reason.empty()) {
+    impl_->rebuild();
+    return outcome;
+  }
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    outcome.factors.push_back(impl_->factors.size());
+    impl_->factors.push_back(factors[i]);
+    impl_->isam_index.push_back(indices[i]);
+  }
+  impl_->values.insert(values);
+  outcome.accepted = true;
+  return outcome;
+}
+
+SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
+  SolverOutcome outcome;
+  outcome.reason = impl_->broken;
+  if (!outcome.reason.empty()) return outcome;
+  gtsam::FactorIndices removed;
+  for (const FactorId id : factors) {
+    if (id >= impl_->factors.size() || !impl_->factors[id]) {
+      outcome.reason = std::format("there is no factor {}", id);
+      return outcome;
+    }
+    removed.push_back(impl_->isam_index[id]);
+  }
+  for (const FactorId id : factors) impl_->factors[id].reset();
+  gtsam::FactorIndices none;
+  outcome.reason = impl_->update({}, {}, removed, none);
+  if (!outcome.reason.empty()) impl_->rebuild();
+  outcome.accepted = true;
+  return outcome;
+}
+
+bool IncrementalSolver::settle(int updates) {
+  for (int i = 0; i < updates && impl_->broken.empty(); ++i) {
+    gtsam::FactorIndices none;
+    if (!impl_->update({}, {}, {}, none).empty()) {
+      impl_->rebuild();
+      return false;
+    }
+  }
+  return impl_->broken.empty();
+}
+
+const gtsam::Values& IncrementalSolver::estimate() { return impl_->estimate(); }
+
+gtsam::Pose3 IncrementalSolver::pose(std::uint64_t key) const {
+  return impl_->broken.empty() ? impl_->isam.calculateEstimate<gtsam::Pose3>(key) : impl_->values.at<gtsam::Pose3>(key);
+}
+
+double IncrementalSolver::half_chi_square() {
+  const gtsam::Values& values = impl_->estimate();
+  double sum = 0.0;
+  for (const auto& factor : impl_->factors) {
+    if (factor) sum += factor->error(values);
+  }
+  return sum;
+}
+
+double IncrementalSolver::half_chi_square(FactorId factor) {
+  return impl_->factors.at(factor)->error(impl_->estimate());
+}
+
+std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint64_t key) const {
+  try {
+    const Eigen::MatrixXd covariance = impl_->isam.marginalCovariance(key);
+    if (covariance.allFinite()) return covariance;
+  } catch (const std::exception&) {
+    // The covariance is an extra: without it the pose still stands.
+  }
+  return std::nullopt;
+}
+
+int IncrementalSolver::rebuilds() const { return impl_->rebuilds; }
+
+}  // namespace ignis

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/config_fields.h"
+
+namespace gtsam {
+class NonlinearFactorGraph;
+class Pose3;
+class Values;
+}  // namespace gtsam
+
+namespace ignis {
+
+/// When iSAM2 linearises a variable anew. The usual 0.1 ends centimetres away from the optimum; these stay within
+/// 0.1 mm of it.
+struct SolverConfig {
+  double relinearize_position_m = 0.01;
+  double relinearize_rotation_rad = 0.001;
+  double relinearize_velocity = 0.05;
+  double relinearize_bias = 0.01;
+  int relinearize_skip = 1;
+
+  void visit_fields(this auto& self, auto& visit) {
+    visit.number("relinearize_position_m", self.relinearize_position_m, {1e-6, 1.0}, "m",
+                 "shift of a position that asks for a new linearisation");
+    visit.number("relinearize_rotation_rad", self.relinearize_rotation_rad, {1e-6, 1.0}, "rad", "the same, attitude");
+    visit.number("relinearize_velocity", self.relinearize_velocity, {1e-6, 10.0}, "m/s", "the same, velocity");
+    visit.number("relinearize_bias", self.relinearize_bias, {1e-7, 10.0}, "m/s^2 or rad/s", "the same, biases");
+    visit.integer("relinearize_skip", self.relinearize_skip, {1, 100}, "updates",
+                  "updates between checks of the thresholds");
+  }
+};
+
+/// Number of a factor in the solver's own list; never reused.
+using FactorId = std::size_t;
+
+/// What became of a batch. A refused batch has left nothing behind.
+struct SolverOutcome {
+  bool accepted = false;
+  std::string reason;             ///< why it was refused
+  std::vector<FactorId> factors;  ///< of the batch, in its order
+};
+
+/// iSAM2 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", IJRR 31(2), 2012) that
+/// survives its own exceptions. GTSAM's object is unusable after one, so factors and values are kept here as well; when
+/// a batch makes it throw, a fresh iSAM2 is built from everything but that batch. Deterministic; for one thread.
+///
+/// Pose variables have the letter x, velocities v, biases b.
+class IncrementalSolver {
+ public:
+  explicit IncrementalSolver(const SolverConfig& config);
+  ~IncrementalSolver();
+  IncrementalSolver(IncrementalSolver&&) noexcept;
+  IncrementalSolver& operator=(IncrementalSolver&&) noexcept;
+
+  /// Adds factors and new variables in one update. All or nothing. Refuses before GTSAM sees it: a variable that
+  /// exists, a factor on an unknown variable, a factor whose error is not finite.
+  [[nodiscard]] SolverOutcome add(const gtsam::NonlinearFactorGraph& factors, const gtsam::Values& values);
+
+  /// Takes factors out again. Must not leave a variable without factors.
+  [[nodiscard]] SolverOutcome remove(std::span<const FactorId> factors);
+
+  /// Further updates without news, after a large correction. False when the solver had to be rebuilt.
+  bool settle(int updates);
+
+  /// The current solution; valid until the next call that changes the graph.
+  [[nodiscard]] const gtsam::Values& estimate();
+
+  /// One pose of it, without the cost of all the others. The variable must exist.
+  [[nodiscard]] gtsam::Pose3 pose(std::uint64_t key) const;
+
+  /// Half chi-square at the current solution, of the whole graph and of one factor.
+  [[nodiscard]] double half_chi_square();
+  [[nodiscard]] double half_chi_square(FactorId factor);
+
+  /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
+  [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
+
+  /// Times that iSAM2 had to be built anew.
+  [[nodiscard]] int rebuilds() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ignis

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/keyframe_check.h"
+
+#include <cmath>
+
+namespace ignis {
+namespace {
+
+constexpr double kUnitTolerance = 1e-3;
+constexpr double kSymmetryTolerance = 1e-6;  // relative to the largest entry
+constexpr double kAbsurdPosition = 1e6;      // [m]
+constexpr double kAbsurdSpeed = 500.0;       // [m/s]
+constexpr double kAbsurdBias = 100.0;        // [rad/s] or [m/s^2]
+
+}  // namespace
+
+std::string keyframe_problem(const Keyframe& keyframe) {
+  const NavState& state = keyframe.state;
+  if (!state.T_odom_body.all_finite()) return "the pose is not finite";
+  if (!state.v_odom.allFinite()) return "the velocity is not finite";
+  if (!state.gyro_bias.allFinite() || !state.accel_bias.allFinite()) return "a bias is not finite";
+  if (!keyframe.scan_information.allFinite()) return "the scan information is not finite";
+  if (std::abs(state.T_odom_body.rotation.norm() - 1.0) > kUnitTolerance) return "the quaternion is not of unit length";
+  if (state.T_odom_body.translation.norm() > kAbsurdPosition) return "the position is absurd";
+  if (state.v_odom.norm() > kAbsurdSpeed) return "the velocity is absurd";
+  if (state.gyro_bias.norm() > kAbsurdBias || state.accel_bias.norm() > kAbsurdBias) return "a bias is absurd";
+  const Matrix6d& information = keyframe.scan_information;
+  const double skewness = (information - information.transpose()).cwiseAbs().maxCoeff();
+  if (skewness > kSymmetryTolerance * information.cwiseAbs().maxCoeff()) return "the scan information is not symmetric";
+  return {};
+}
+
+}  // namespace ignis

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/loop_matcher.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <format>
+#include <optional>
+#include <vector>
+
+#include "backend/plane_map.h"
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+constexpr double kRadiusShrink = 0.8;        // per iteration
+constexpr double kConvergedPosition = 5e-4;  // [m] step below which the alignment stands
+constexpr double kConvergedRotation = 2e-4;  // [rad]
+constexpr double kKernelPerRadius = 0.2;     // width of the Cauchy kernel relative to the search radius
+constexpr double kAgreeingCosine = 0.87;     // 30 degrees between a point's own normal and the map's
+constexpr double kWallCosine = 0.5;          // a surface whose normal is at least 60 degrees from the body's up
+
+/// A point of the keyframe that looks, and the direction of the surface it lies on, where that is known.
+struct SourcePoint {
+  Eigen::Vector3d position;
+  std::optional<Eigen::Vector3d> normal;
+
+  [[nodiscard]] bool on_wall() const { return normal && std::abs(normal->y()) < kWallCosine; }
+  [[nodiscard]] bool agrees_with(const Eigen::Vector3d& n_source) const {
+    return !normal || std::abs(normal->dot(n_source)) > kAgreeingCosine;
+  }
+};
+
+/// Normal equations of the point-to-plane distances, perturbing the source pose in its body axes.
+struct NormalEquations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+  double weighted_square = 0.0;  ///< sum of w r^2
+  double weight = 0.0;           ///< sum of w
+  double absolute = 0.0;         ///< sum of |r|
+  int matched = 0;
+  int walls_matched = 0;
+};
+
+NormalEquations accumulate(std::span<const SourcePoint> source, PlaneMap& map, const Pose& T_map_source,
+                           double radius_m) {
+  const double kernel = kKernelPerRadius * radius_m;
+  const Eigen::Matrix3d R_source_map = T_map_source.rotation.conjugate().toRotationMatrix();
+  NormalEquations sum;
+  for (const SourcePoint& point : source) {
+    const Eigen::Vector3d& p_source = point.position;
+    const Eigen::Vector3d p_map = T_map_source * p_source;
+    const std::optional<SurfacePlane> plane = map.nearest_plane(p_map, radius_m);
+    if (!plane) continue;
+    const double residual = plane->normal.dot(p_map - plane->centre);
+    const Eigen::Vector3d n_source = R_source_map * plane->normal;
+    if (!point.agrees_with(n_source)) continue;
+    Vector6d J;
+    J << p_source.cross(n_source), n_source;
+    const double weight = 1.0 / (1.0 + residual * residual / (kernel * kernel));
+    sum.H += weight * J * J.transpose();
+    sum.b -= weight * residual * J;
+    sum.weighted_square += weight * residual * residual;
+    sum.weight += weight;
+    sum.absolute += std::abs(residual);
+    ++sum.matched;
+    if (point.on_wall()) ++sum.walls_matched;
+  }
+  return sum;
+}
+
+/// The well-observed part of the normal equations. Rotation is scaled by a length so that all directions compare.
+struct ObservedPart {
+  Vector6d step = Vector6d::Zero();
+  Matrix6d H = Matrix6d::Zero();
+  int directions = 0;
+};
+
+ObservedPart observed_part(const NormalEquations& equations, double length_m, double degenerate_ratio) {
+  Vector6d unit;
+  unit << Eigen::Vector3d::Constant(1.0 / length_m), Eigen::Vector3d::Ones();
+  const Matrix6d H = unit.asDiagonal() * equations.H * unit.asDiagonal();
+  const Vector6d b = unit.asDiagonal() * equations.b;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(H);
+  ObservedPart part;
+  for (int i = 0; i < 6; ++i) {
+    const double strength = eigen.eigenvalues()(i);
+    if (strength <= degenerate_ratio * equations.weight || strength <= 0.0) continue;
+    const Vector6d direction = eigen.eigenvectors().col(i);
+    part.step += direction * (direction.dot(b) / strength);
+    part.H += strength * direction * direction.transpose();
+    ++part.directions;
+  }
+  part.step = unit.asDiagonal() * part.step;
+  part.H = unit.cwiseInverse().asDiagonal() * part.H * unit.cwiseInverse().asDiagonal();
+  return part;
+}
+
+double rms_range(std::span<const SourcePoint> points) {
+  double sum = 0.0;
+  for (const SourcePoint& point : points) sum += point.position.squaredNorm();
+  return std::max(0.1, std::sqrt(sum / static_cast<double>(points.size())));
+}
+
+std::vector<SourcePoint> source_points(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config,
+                                       const PlaneGates& plane_gates) {
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(cloud.size());
+  for (const CloudPoint& point : cloud) {
+    if (point.position.allFinite()) points.push_back(point.position.cast<double>());
+  }
+  PlaneMap surfaces(points, config.map_voxel_m, plane_gates);
+  std::vector<SourcePoint> source;
+  for (const Eigen::Vector3d& point : one_per_voxel(points, config.source_voxel_m)) {
+    const auto plane = surfaces.nearest_plane(point, config.plane_radius_m);
+    source.push_back({point, plane ? std::optional(plane->normal) : std::nullopt});
+  }
+  return source;
+}
+
+void judge(LoopMatch& match, bool converged, const LoopMatcherConfig& config, const LoopGates& gates) {
+  if (match.matched_fraction < gates.loop_match_min_frac) {
+    match.reason = LoopReason::kTooFewMatched;
+    match.reason_text = std::format("{:.0f} % of the points found a plane, at least {:.0f} % are needed",
+                                    100.0 * match.matched_fraction, 100.0 * gates.loop_match_min_frac);
+  } else if (match.wall_fraction < config.min_wall_fraction) {
+    match.reason = LoopReason::kTooFewMatched;
+    match.reason_text = std::format("{:.0f} % of the upright surfaces found their like, at least {:.0f} % are needed",
+                                    100.0 * match.wall_fraction, 100.0 * config.min_wall_fraction);
+  } else if (match.directions < config.min_directions) {
+    match.reason = LoopReason::kDegenerate;
+    match.reason_text = std::format("the geometry holds {} of 6 directions, at least {} are needed", match.directions,
+                                    config.min_directions);
+  } else if (match.mean_residual > gates.loop_max_mean_innovation) {
+    match.reason = LoopReason::kResidualTooLarge;
+    match.reason_text = std::format("mean residual {:.3f} m, at most {:.3f} m is allowed", match.mean_residual,
+                                    gates.loop_max_mean_innovation);
+  } else if (match.correction_m > gates.loop_max_correction_m) {
+    match.reason = LoopReason::kCorrectionTooLarge;
+    match.reason_text = std::format("correction {:.2f} m, at most {:.2f} m is allowed", match.correction_m,
+                                    gates.loop_max_correction_m);
+  } else if (!converged) {
+    match.reason = LoopReason::kDidNotConverge;
+    match.reason_text = std::format("no convergence in {} iterations", match.iterations);
+  } else {
+    match.reason = LoopReason::kAccepted;
+    match.reason_text =
+        std::format("{:.0f} % matched at {:.3f} m, correction {:.2f} m, {} directions held",
+                    100.0 * match.matched_fraction, match.mean_residual, match.correction_m, match.directions);
+  }
+}
+
+}  // namespace
+
+void LoopMatcherConfig::check(config::Offences& offences, const std::string& path) const {
+  if (last_radius_m > first_radius_m) {
+    offences.push_back({path + ".last_radius_m", std::format("{}", last_radius_m),
+                        std::format("at most first_radius_m, {}", first_radius_m)});
+  }
+}
+
+LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::Vector3d> map_points,
+                     const Pose& T_map_source_predicted, const LoopMatcherConfig& config, const LoopGates& gates) {
+  LoopMatch match;
+  match.T_map_source = T_map_source_predicted;
+  const PlaneGates plane_gates{config.plane_radius_m, config.plane_thickness_m, config.plane_min_points};
+  const std::vector<SourcePoint> points = source_points(source, config, plane_gates);
+  if (points.empty() || map_points.empty()) {
+    match.reason_text = points.empty() ? "the keyframe has no points" : "the candidate has no points";
+    return match;
+  }
+  PlaneMap map(map_points, config.map_voxel_m, plane_gates);
+  const double length = rms_range(points);
+
+  bool converged = false;
+  double radius = config.first_radius_m;
+  while (!converged && match.iterations < config.max_iterations) {
+    const NormalEquations equations = accumulate(points, map, match.T_map_source, radius);
+    const ObservedPart part = observed_part(equations, length, config.degenerate_ratio);
+    ++match.iterations;
+    if (part.directions == 0) break;
+    match.T_map_source = perturbed_in_body(match.T_map_source, part.step);
+    converged = radius <= config.last_radius_m && part.step.head<3>().norm() < kConvergedRotation &&
+                part.step.tail<3>().norm() < kConvergedPosition;
+    radius = std::max(config.last_radius_m, kRadiusShrink * radius);
+  }
+
+  const NormalEquations final_sum = accumulate(points, map, match.T_map_source, config.last_radius_m);
+  const ObservedPart part = observed_part(final_sum, length, config.degenerate_ratio);
+  match.directions = part.directions;
+  match.matched_fraction = static_cast<double>(final_sum.matched) / static_cast<double>(points.size());
+  const auto walls = std::ranges::count_if(points, &SourcePoint::on_wall);
+  // Without upright surfaces nothing was asked of them; the count of directions then decides.
+  match.wall_fraction = walls > 0 ? static_cast<double>(final_sum.walls_matched) / static_cast<double>(walls) : 1.0;
+  if (final_sum.matched > 0) match.mean_residual = final_sum.absolute / final_sum.matched;
+  const double floor = config.noise_floor_m * config.noise_floor_m;
+  const double variance =
+      final_sum.weight > 0.0 ? std::max(floor, final_sum.weighted_square / final_sum.weight) : floor;
+  match.information = part.H / variance;
+  const Vector6d correction = body_difference(T_map_source_predicted, match.T_map_source);
+  match.correction_rad = correction.head<3>().norm();
+  match.correction_m = correction.tail<3>().norm();
+  judge(match, converged, config, gates);
+  return match;
+}
+
+}  // namespace ignis

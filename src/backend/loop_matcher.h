@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "backend/loop_result.h"
+#include "common/config_fields.h"
+#include "common/loop_gates.h"
+#include "common/measurements.h"
+#include "common/pose.h"
+
+namespace ignis {
+
+/// Parameters of the scan match that confirms a loop.
+struct LoopMatcherConfig {
+  int max_iterations = 40;
+  int neighbours = 2;               ///< keyframes on either side of the candidate that enter its local map
+  double map_voxel_m = 0.1;         ///< one point per voxel of the local map
+  double source_voxel_m = 0.3;      ///< one point per voxel of the keyframe that looks
+  double first_radius_m = 2.0;      ///< search radius of the first iteration
+  double last_radius_m = 0.5;       ///< search radius at the end; a matched point has a plane within it
+  double plane_radius_m = 0.6;      ///< neighbourhood that a plane is fitted to
+  double plane_thickness_m = 0.08;  ///< largest standard deviation across a plane
+  int plane_min_points = 6;         ///< fewest points of a plane
+  double degenerate_ratio = 0.01;   ///< a direction below this share of the matched points' weight is left free
+  int min_directions = 5;           ///< fewest directions that the geometry must hold: a wall beside the floor
+  double min_wall_fraction = 0.5;   ///< upright surfaces that must find their like; a floor fits any other floor
+  double noise_floor_m = 0.01;      ///< smallest point noise that the information may assume
+
+  void visit_fields(this auto& self, auto& visit) {
+    visit.integer("max_iterations", self.max_iterations, {1, 500}, "1", "iterations of the alignment at most");
+    visit.integer("neighbours", self.neighbours, {0, 20}, "keyframes",
+                  "keyframes on either side of the candidate in its local map");
+    visit.number("map_voxel_m", self.map_voxel_m, {0.01, 2.0}, "m", "one point of the local map per voxel");
+    visit.number("source_voxel_m", self.source_voxel_m, {0.01, 2.0}, "m", "one point of the current cloud per voxel");
+    visit.number("first_radius_m", self.first_radius_m, {0.05, 10.0}, "m", "search radius of the first iteration");
+    visit.number("last_radius_m", self.last_radius_m, {0.05, 10.0}, "m", "search radius of the last iterations");
+    visit.number("plane_radius_m", self.plane_radius_m, {0.05, 5.0}, "m", "neighbourhood that a plane is fitted to");
+    visit.number("plane_thickness_m", self.plane_thickness_m, {0.001, 1.0}, "m",
+                 "largest standard deviation across a plane");
+    visit.integer("plane_min_points", self.plane_min_points, {3, 1000}, "points", "fewest points of a plane");
+    visit.number("degenerate_ratio", self.degenerate_ratio, {0.0, 0.3}, "1",
+                 "directions that hold less than this share of the matched points are left free");
+    visit.integer("min_directions", self.min_directions, {1, 6}, "1", "fewest directions that the geometry must hold");
+    visit.number("min_wall_fraction", self.min_wall_fraction, {0.0, 1.0}, "1",
+                 "fraction of the points on upright surfaces that must find a plane of like direction");
+    visit.number("noise_floor_m", self.noise_floor_m, {1e-4, 1.0}, "m", "smallest point noise assumed");
+  }
+  void check(config::Offences& offences, const std::string& path) const;
+};
+
+/// What the match found. The pose and the figures are filled for a refused match too.
+struct LoopMatch {
+  LoopReason reason = LoopReason::kTooFewMatched;
+  std::string reason_text;
+  Pose T_map_source;
+  Matrix6d information = Matrix6d::Zero();  ///< of the match alone; attitude then position, body axes of the source
+  int directions = 0;                       ///< directions that the geometry holds, 0..6
+  double matched_fraction = 0.0;
+  double wall_fraction = 0.0;  ///< the same among points on upright surfaces
+  double mean_residual = 0.0;  ///< [m] mean absolute point-to-plane distance of the matched points
+  double correction_m = 0.0;   ///< translation from the prediction to the result
+  double correction_rad = 0.0;
+  int iterations = 0;
+
+  [[nodiscard]] bool verified() const { return reason == LoopReason::kAccepted; }
+};
+
+/// A point counts as matched when the nearest map point within the search radius lies on a plane whose direction agrees
+/// with that of the point's own surroundings, where those are planar.
+///
+/// Aligns `source` (body frame of the current keyframe) with the local map `map_points` (any frame) by point-to-plane
+/// Gauss-Newton with a search radius that narrows and Cauchy weights, beginning at `T_map_source` predicted; then
+/// applies the gates. Directions in which the geometry says nothing keep the prediction and get no information (J.
+/// Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state estimation problems", ICRA 2016).
+[[nodiscard]] LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::Vector3d> map_points,
+                                   const Pose& T_map_source_predicted, const LoopMatcherConfig& config,
+                                   const LoopGates& gates);
+
+}  // namespace ignis

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/loop_result.h"
+
+namespace ignis {
+
+const char* text(LoopReason reason) {
+  switch (reason) {
+    case LoopReason::kAccepted:
+      return "accepted";
+    case LoopReason::kNoCandidate:
+      return "no candidate";
+    case LoopReason::kTooFewMatched:
+      return "too few points matched";
+    case LoopReason::kResidualTooLarge:
+      return "residual too large";
+    case LoopReason::kCorrectionTooLarge:
+      return "correction too large";
+    case LoopReason::kDegenerate:
+      return "geometry degenerate";
+    case LoopReason::kDisabled:
+      return "loop closing disabled";
+    case LoopReason::kSolverRefused:
+      return "solver refused the factor";
+    case LoopReason::kWithdrawn:
+      return "withdrawn: contradicts the rest of the graph";
+    case LoopReason::kDidNotConverge:
+      return "match did not converge";
+    case LoopReason::kTooSoon:
+      return "too soon after the last loop";
+  }
+  return "unknown";
+}
+
+}  // namespace ignis

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace ignis {
+
+/// A plane through `centre`, fitted to the neighbourhood of a map point.
+struct SurfacePlane {
+  Eigen::Vector3d normal;  ///< unit length, sign arbitrary
+  Eigen::Vector3d centre;
+};
+
+/// When a neighbourhood counts as a plane.
+struct PlaneGates {
+  double radius_m;     ///< neighbours are looked for this far
+  double thickness_m;  ///< largest standard deviation across the plane
+  int min_points;      ///< fewest neighbours
+};
+
+/// A static point map in one frame that answers "which plane is nearest". Planes are fitted once, when first asked for;
+/// answers depend on the points alone, not on the order of the questions. Not for use by several threads.
+class PlaneMap {
+ public:
+  /// Keeps one point (the first) per voxel of `voxel_m`.
+  PlaneMap(std::span<const Eigen::Vector3d> points, double voxel_m, const PlaneGates& gates);
+
+  /// The plane at the map point nearest to `point`, if there is one within `radius_m` and its surroundings are planar.
+  [[nodiscard]] std::optional<SurfacePlane> nearest_plane(const Eigen::Vector3d& point, double radius_m);
+
+  [[nodiscard]] std::size_t size() const { return points_.size(); }
+
+ private:
+  enum class Fit : std::uint8_t { kUnknown, kPlane, kNoPlane };
+  struct Entry {
+    Fit fit = Fit::kUnknown;
+    SurfacePlane plane;
+  };
+
+  [[nodiscard]] std::optional<std::size_t> nearest_point(const Eigen::Vector3d& point, double radius_m) const;
+  [[nodiscard]] Entry fit_plane(const Eigen::Vector3d& at) const;
+  template <class Visit>
+  void visit_cell(const Eigen::Vector3i& cell, Visit visit) const;
+
+  PlaneGates gates_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<Entry> entries_;
+  std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
+};
+
+/// One point (the first) per cubic voxel, in the order of the input.
+[[nodiscard]] std::vector<Eigen::Vector3d> one_per_voxel(std::span<const Eigen::Vector3d> points, double voxel_m);
+
+}  // namespace ignis

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/driver_config.h"
+
+namespace ignis {
+
+Extrinsics l1_extrinsics() {
+  Extrinsics extrinsics;
+  extrinsics.lidar.pitch_deg = -45.0;
+  extrinsics.imu.pitch_deg = -45.0;
+  const Eigen::Vector3d imu_in_lidar(-0.007698, -0.014655, 0.00667);
+  const Eigen::Vector3d imu_in_body = extrinsics.lidar.T_body_sensor() * imu_in_lidar;
+  extrinsics.imu.translation_m = {imu_in_body.x(), imu_in_body.y(), imu_in_body.z()};
+  return extrinsics;
+}
+
+}  // namespace ignis

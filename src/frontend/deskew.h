@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "common/measurements.h"
+#include "common/nav_state.h"
+#include "frontend/frontend_config.h"
+
+namespace ignis {
+
+/// Moves every point of a scan to the body frame at the scan's END, by integrating the IMU backward from the state
+/// there.
+///
+/// `samples` are IMU samples in time order; the last one must be at or after the scan's end. Before the first and after
+/// the last sample the nearest one holds. Points that are not finite or outside the accepted range are dropped;
+/// instants outside the scan are clamped into it. The velocity of the state may be wrong or unknown (zero): the result
+/// is then compensated for rotation alone, and calling again with the corrected state gives the better cloud.
+[[nodiscard]] std::vector<CloudPoint> deskew(const Scan& scan, const NavState& state_at_end,
+                                             std::span<const ImuSample> samples, const FrontendConfig& config);
+
+}  // namespace ignis

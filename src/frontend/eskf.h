@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "common/measurements.h"
+#include "common/nav_state.h"
+#include "frontend/frontend_config.h"
+
+/// The error-state Kalman filter's nominal state, its error convention and its prediction.
+///
+/// Convention: the error is ordered as ErrorBlock. Attitude is perturbed on the right, in body axes, R_true = R exp(d);
+/// all other blocks add. One step over dt with constant gyro w and accel a (both minus bias) is
+///   R' = R exp(w dt),   a_odom = R exp(w dt / 2) a + g,   V' = V + a_odom dt,   P' = P + V dt + a_odom dt^2 / 2,
+/// and the transition matrix is the exact derivative of that step, not a truncated continuous model.
+/// Equations: J. Sola, "Quaternion kinematics for the error-state Kalman filter", arXiv:1711.02508, with the mid-step
+/// attitude in place of the initial one.
+namespace ignis {
+
+using Vector15d = Eigen::Matrix<double, 15, 1>;
+
+/// Nominal state and covariance at one instant.
+struct FilterState {
+  NavState nominal;
+  Matrix15d covariance = Matrix15d::Identity();
+};
+
+/// Specific force and angular rate, constant over a step. Biased, as measured, body axes.
+struct InertialInput {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s]
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< [m/s^2]
+};
+
+/// Mean of two consecutive samples: the midpoint rule.
+[[nodiscard]] InertialInput midpoint(const ImuSample& a, const ImuSample& b);
+
+/// The sample that lies at `utime` on the line between two samples.
+[[nodiscard]] ImuSample interpolate(const ImuSample& a, const ImuSample& b, Utime utime);
+
+/// The state moved by an error vector, and the error vector that moves `from` to `to`.
+[[nodiscard]] NavState perturbed(const NavState& state, const Vector15d& error);
+[[nodiscard]] Vector15d difference(const NavState& from, const NavState& to);
+
+/// Nominal prediction over dt [s]. A negative dt is not the inverse; see predict_backward. Stamps are the caller's.
+[[nodiscard]] NavState predict_nominal(const NavState& state, const InertialInput& input, double dt, double gravity);
+
+/// The state from which predict_nominal with the same input leads to `state`.
+[[nodiscard]] NavState predict_backward(const NavState& state, const InertialInput& input, double dt, double gravity);
+
+/// Derivative of predict_nominal with respect to the error of the state.
+[[nodiscard]] Matrix15d transition(const NavState& state, const InertialInput& input, double dt);
+
+/// Nominal and covariance over dt [s]. `noise_scale` multiplies the variance of the white IMU noise; 1 for a healthy
+/// sample, more across a gap or while an axis is clipped.
+void predict(FilterState& filter, const InertialInput& input, double dt, const FrontendConfig& config,
+             double noise_scale = 1.0);
+
+/// Makes a covariance exactly symmetric. Returns false when it is not finite or a variance is not positive.
+[[nodiscard]] bool make_symmetric(Matrix15d& covariance);
+
+}  // namespace ignis

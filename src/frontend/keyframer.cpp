@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/keyframer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "common/frames.h"
+#include "frontend/voxel_downsample.h"
+
+namespace ignis {
+namespace {
+
+constexpr double kStationaryDisplacement = 0.03;  // m: above the jitter of a standing filter
+constexpr double kStationaryTurnRate = 0.02;      // rad/s, mean over the interval
+
+double heading_change(const NavState& from, const NavState& to) {
+  const double change =
+      frames::to_yaw_pitch_roll(to.T_odom_body.rotation).yaw - frames::to_yaw_pitch_roll(from.T_odom_body.rotation).yaw;
+  return std::abs(std::remainder(change, 2.0 * std::numbers::pi));
+}
+
+}  // namespace
+
+Keyframer::Keyframer(const FrontendConfig& config, std::int32_t session) : config_(config), session_(session) {
+  config::require_valid(config, "frontend");
+}
+
+void Keyframer::add_imu(const ImuSample& sample) {
+  if (next_id_ > 0) imu_.push_back(sample);
+}
+
+std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
+                                            std::vector<CloudPoint> cloud) {
+  const NavState& state = filter.nominal;
+  recent_.push_back({state.utime, state.T_odom_body, voxel_downsample(cloud, config_.voxel_size_m)});
+  const Utime oldest = state.utime - to_micros(config_.keyframe_cloud_seconds);
+  while (recent_.front().utime <= oldest) recent_.pop_front();
+
+  information_sum_ += information_body;
+  ++scans_;
+  note_motion(state);
+  if (!due(state)) return std::nullopt;
+  return make(filter);
+}
+
+void Keyframer::note_motion(const NavState& state) {
+  speed2_sum_ += state.v_odom.squaredNorm();
+  max_displacement_ =
+      std::max(max_displacement_, (state.T_odom_body.translation - last_.T_odom_body.translation).norm());
+}
+
+bool Keyframer::due(const NavState& state) const {
+  if (next_id_ == 0) return true;
+  const double distance = (state.T_odom_body.translation - last_.T_odom_body.translation).norm();
+  return distance >= config_.keyframe_dist_m || heading_change(last_, state) >= config_.keyframe_yaw_rad ||
+         seconds_between(last_.utime, state.utime) >= config_.keyframe_max_seconds;
+}
+
+bool Keyframer::stood_still(const NavState& state) const {
+  if (imu_.empty() || !imu_complete_) return false;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  const auto count = static_cast<double>(imu_.size());
+  for (const ImuSample& sample : imu_) {
+    gyro += (sample.gyro - state.gyro_bias) / count;
+    accel += (sample.accel - state.accel_bias) / count;
+  }
+  return max_displacement_ < kStationaryDisplacement && gyro.norm() < kStationaryTurnRate &&
+         std::abs(accel.norm() - config_.gravity_m) < config_.rest_accel_band &&
+         speed2_sum_ < scans_ * config_.stationary_speed * config_.stationary_speed;
+}
+
+std::vector<CloudPoint> Keyframer::merged_cloud(const Pose& T_odom_body) const {
+  const Pose T_body_odom = T_odom_body.inverse();
+  std::vector<CloudPoint> merged;
+  for (const RegisteredScan& scan : recent_) {
+    const Pose T_keyframe_scan = T_body_odom * scan.T_odom_body;
+    const Eigen::Matrix3f R = T_keyframe_scan.rotation.toRotationMatrix().cast<float>();
+    const Eigen::Vector3f t = T_keyframe_scan.translation.cast<float>();
+    for (const CloudPoint& point : scan.cloud) merged.push_back({R * point.position + t, point.intensity});
+  }
+  return voxel_downsample(merged, config_.voxel_size_m);
+}
+
+Keyframe Keyframer::make(const FilterState& filter) {
+  const NavState& state = filter.nominal;
+  Keyframe keyframe;
+  keyframe.id = next_id_;
+  keyframe.session = session_;
+  keyframe.state = state;
+  keyframe.covariance = filter.covariance;
+  keyframe.cloud = merged_cloud(state.T_odom_body);
+  keyframe.previous_utime = next_id_ == 0 ? state.utime : last_.utime;
+  if (next_id_ > 0) {
+    keyframe.scan_information = information_sum_ / scans_;
+    keyframe.stationary = stood_still(state);
+    keyframe.imu_complete = imu_complete_;
+  }
+  keyframe.imu = std::exchange(imu_, {});
+
+  ++next_id_;
+  last_ = state;
+  imu_complete_ = true;
+  information_sum_.setZero();
+  scans_ = 0;
+  speed2_sum_ = 0.0;
+  max_displacement_ = 0.0;
+  return keyframe;
+}
+
+}  // namespace ignis

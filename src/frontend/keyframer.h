@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "common/keyframe.h"
+#include "frontend/eskf.h"
+#include "frontend/frontend_config.h"
+
+namespace ignis {
+
+/// Decides when a keyframe is due (distance, turn, or time since the last one; the first scan always) and assembles it:
+/// the last second of deskewed scans as one cloud, the IMU samples and the scan-matching information of the interval.
+class Keyframer {
+ public:
+  Keyframer(const FrontendConfig& config, std::int32_t session);
+
+  /// Each IMU sample once, in time order, before the first scan that ends after it.
+  void add_imu(const ImuSample& sample);
+
+  /// The interval since the last keyframe has an IMU gap.
+  void note_gap() { imu_complete_ = false; }
+
+  /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied. `cloud` is in
+  /// the body frame at that state.
+  std::optional<Keyframe> add_scan(const FilterState& filter, const Matrix6d& information_body,
+                                   std::vector<CloudPoint> cloud);
+
+ private:
+  struct RegisteredScan {
+    Utime utime;
+    Pose T_odom_body;
+    std::vector<CloudPoint> cloud;  ///< body frame
+  };
+
+  void note_motion(const NavState& state);
+  [[nodiscard]] bool due(const NavState& state) const;
+  [[nodiscard]] bool stood_still(const NavState& state) const;
+  [[nodiscard]] std::vector<CloudPoint> merged_cloud(const Pose& T_odom_body) const;
+  [[nodiscard]] Keyframe make(const FilterState& filter);
+
+  FrontendConfig config_;
+  std::int32_t session_;
+  std::int32_t next_id_ = 0;
+  NavState last_;  ///< of the last keyframe
+  std::deque<RegisteredScan> recent_;
+  std::vector<ImuSample> imu_;
+  bool imu_complete_ = true;
+  Matrix6d information_sum_ = Matrix6d::Zero();
+  int scans_ = 0;                  ///< in the interval
+  double speed2_sum_ = 0.0;        ///< [m^2/s^2] over the scans of the interval
+  double max_displacement_ = 0.0;  ///< [m] from the last keyframe
+};
+
+}  // namespace ignis

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/lio.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "frontend/deskew.h"
+#include "frontend/voxel_downsample.h"
+
+namespace ignis {
+namespace {
+
+constexpr std::size_t kMaxPendingScans = 40;                // two seconds of L1 scans without IMU
+constexpr std::int32_t kMaxScanDurationUs = 500'000;        // longer is not a scan but a broken stamp
+constexpr std::int64_t kMaxLeadUs = 10 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
+constexpr std::int64_t kHistoryUs = kMicrosPerSecond;       // IMU kept behind the committed state, for deskewing
+constexpr double kSaturatedNoiseScale = 100.0;              // a clipped axis says little: ten times the sigma
+constexpr int kScansOfMovingStart = 2;                      // one gives a velocity, the second confirms it
+
+std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
+  std::vector<Eigen::Vector3f> result;
+  result.reserve(cloud.size());
+  for (const CloudPoint& point : cloud) result.push_back(point.position);
+  return result;
+}
+
+double velocity_sigma(const FilterState& filter) {
+  return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
+}
+
+}  // namespace
+
+Lio::Lio(const FrontendConfig& config)
+    : config_(config), initialisation_(config), matcher_(config), map_(config), keyframer_(config, 0) {}
+
+void Lio::reset() {
+  ++session_;
+  imu_ = ImuBuffer();
+  initialisation_ = ImuInitialisation(config_);
+  map_.clear();
+  keyframer_ = Keyframer(config_, session_);
+  pending_.clear();
+  last_scan_end_.reset();
+  running_ = false;
+  filter_ = FilterState();
+  live_ = NavState();
+  velocity_known_ = false;
+  applied_scans_ = 0;
+  contradictions_ = 0;
+}
+
+ImuResult Lio::add_imu(const ImuSample& sample) {
+  ImuResult result;
+  result.fault = imu_.add(sample);
+  if (result.fault != ImuFault::kNone) return result;
+
+  if (running_) {
+    const std::size_t last = imu_.samples().size() - 1;
+    const ImuSample& previous = imu_.samples()[last - 1];
+    live_ = predict_nominal(live_, midpoint(previous, sample), seconds_between(previous.utime, sample.utime),
+                            config_.gravity_m);
+    live_.utime = sample.utime;
+  } else if (std::optional<FilterState> first = initialisation_.add(sample)) {
+    filter_ = *first;
+    live_ = filter_.nominal;
+    running_ = true;
+    velocity_known_ = config_.start == "at_rest";
+  }
+  result.scans = process_pending();
+  if (running_) {
+    advance_to(sample.utime - to_micros(config_.max_scan_delay_s));
+    imu_.forget_before(filter_.nominal.utime - kHistoryUs);
+    result.state = live_;
+  }
+  return result;
+}
+
+std::vector<ScanResult> Lio::add_scan(Scan scan) {
+  const bool broken = scan.duration_us < 0 || scan.duration_us > kMaxScanDurationUs ||
+                      (last_scan_end_ && scan.end_utime() <= *last_scan_end_) ||
+                      (!imu_.empty() && scan.end_utime() > imu_.newest() + kMaxLeadUs);
+  std::vector<ScanResult> results;
+  if (broken) {
+    results.push_back(refuse(scan, ScanReason::kBadStamp));
+    return results;
+  }
+  last_scan_end_ = scan.end_utime();
+  pending_.push_back(std::move(scan));
+  results = process_pending();
+  if (pending_.size() > kMaxPendingScans) {
+    results.push_back(refuse(pending_.front(), ScanReason::kNoImu));
+    pending_.pop_front();
+  }
+  return results;
+}
+
+std::vector<ScanResult> Lio::process_pending() {
+  std::vector<ScanResult> results;
+  while (!pending_.empty() && !imu_.empty() && pending_.front().end_utime() <= imu_.newest()) {
+    results.push_back(process(pending_.front()));
+    pending_.pop_front();
+  }
+  if (running_ && !results.empty()) rebuild_live_state();
+  return results;
+}
+
+ScanResult Lio::refuse(const Scan& scan, ScanReason reason) const {
+  ScanResult result;
+  result.stats.utime = scan.end_utime();
+  result.stats.scan_sequence = scan.sequence;
+  result.stats.session = session_;
+  result.stats.reason = reason;
+  result.stats.T_odom_body = filter_.nominal.T_odom_body;
+  result.stats.map_points = map_.size();
+  return result;
+}
+
+ScanResult Lio::process(const Scan& scan) {
+  if (!running_) return refuse(scan, ScanReason::kNotInitialised);
+  if (scan.end_utime() < filter_.nominal.utime) {
+    const bool before_start = applied_scans_ == 0 && map_.empty();
+    return refuse(scan, before_start ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
+  }
+  advance_to(scan.end_utime());
+  std::vector<CloudPoint> cloud = deskew(scan, filter_.nominal, imu_.samples(), config_);
+  MatchResult match = correct(cloud);
+  match.stats.points = static_cast<int>(cloud.size());
+  filter_ = match.filter;
+  if (match.stats.applied()) ++applied_scans_;
+  follow_moving_start(scan, match.stats.reason, cloud);
+  grow_map(cloud, match.stats.reason);
+
+  ScanResult result;
+  result.stats = match.stats;
+  result.stats.utime = scan.end_utime();
+  result.stats.scan_sequence = scan.sequence;
+  result.stats.session = session_;
+  result.stats.T_odom_body = filter_.nominal.T_odom_body;
+  result.stats.map_points = map_.size();
+  result.has_state = true;
+  result.state = filter_.nominal;
+  result.covariance = filter_.covariance;
+  if (velocity_known_) result.keyframe = keyframer_.add_scan(filter_, match.information_body, cloud);
+  result.cloud = std::move(cloud);
+  return result;
+}
+
+MatchResult Lio::correct(const std::vector<CloudPoint>& cloud) {
+  MatchResult result{filter_, {}, Matrix6d::Zero()};
+  if (std::ssize(cloud) < config_.min_scan_points) {
+    result.stats.reason = ScanReason::kTooFewPoints;
+  } else if (!config_.use_scan_matching) {
+    result.stats.reason = ScanReason::kMatchingDisabled;
+  } else if (map_.empty()) {
+    result.stats.reason = ScanReason::kMapEmpty;
+  } else {
+    const std::vector<Eigen::Vector3f> points = positions(thin(cloud, config_.voxel_size_m, config_.max_scan_points));
+    result = matcher_.match(filter_, points, map_);
+  }
+  return result;
+}
+
+void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud) {
+  if (velocity_known_) return;
+  if (reason == ScanReason::kApplied) {
+    // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
+    cloud = deskew(scan, filter_.nominal, imu_.samples(), config_);
+    map_.clear();
+    velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
+  } else if (is_contradiction(reason)) {
+    map_.clear();
+  }
+}
+
+void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {
+  if (reason == ScanReason::kTooFewPoints) return;
+  contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
+  if (contradictions_ >= config_.reanchor_scans) {
+    map_.clear();
+    contradictions_ = 0;
+  }
+  const bool confirmed = contradictions_ == 0 || map_.empty();
+  map_.insert(positions(cloud), filter_.nominal.T_odom_body, confirmed);
+  map_.slide(filter_.nominal.T_odom_body.translation);
+}
+
+void Lio::advance_to(Utime utime) {
+  const std::vector<ImuSample>& samples = imu_.samples();
+  Utime& now = filter_.nominal.utime;
+  if (utime <= now) return;
+  auto next = static_cast<std::size_t>(std::ranges::upper_bound(samples, now, {}, &ImuSample::utime) - samples.begin());
+  for (; now < utime && next < samples.size(); ++next) {
+    const ImuSample& before = samples[next - 1];
+    const ImuSample& after = samples[next];
+    if (before.utime == now) keyframer_.add_imu(before);
+    if (imu_.gap_before(next)) keyframer_.note_gap();
+    const Utime step_end = std::min(utime, after.utime);
+    const ImuSample first = interpolate(before, after, now);
+    const ImuSample last = interpolate(before, after, step_end);
+    predict(filter_, midpoint(first, last), seconds_between(now, step_end), config_, noise_scale(next));
+    now = step_end;
+  }
+}
+
+double Lio::noise_scale(std::size_t sample_after) const {
+  const bool clipped = imu_.samples()[sample_after].saturated || imu_.samples()[sample_after - 1].saturated;
+  // Across a gap two samples stand for many: the variance of their mean does not shrink with the time between them.
+  const double gap = imu_.gap_before(sample_after) ? imu_.periods_before(sample_after) : 1.0;
+  return gap * (clipped ? kSaturatedNoiseScale : 1.0);
+}
+
+void Lio::rebuild_live_state() {
+  const std::vector<ImuSample>& samples = imu_.samples();
+  live_ = filter_.nominal;
+  auto next =
+      static_cast<std::size_t>(std::ranges::upper_bound(samples, live_.utime, {}, &ImuSample::utime) - samples.begin());
+  for (; next < samples.size(); ++next) {
+    const ImuSample first = interpolate(samples[next - 1], samples[next], live_.utime);
+    live_ = predict_nominal(live_, midpoint(first, samples[next]), seconds_between(live_.utime, samples[next].utime),
+                            config_.gravity_m);
+    live_.utime = samples[next].utime;
+  }
+}
+
+}  // namespace ignis

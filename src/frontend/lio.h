@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/keyframe.h"
+#include "common/measurements.h"
+#include "frontend/frontend_config.h"
+#include "frontend/imu_buffer.h"
+#include "frontend/imu_initialisation.h"
+#include "frontend/keyframer.h"
+#include "frontend/local_map.h"
+#include "frontend/scan_matcher.h"
+#include "frontend/scan_stats.h"
+
+namespace ignis {
+
+/// Everything that one scan led to.
+struct ScanResult {
+  ScanStats stats;
+  bool has_state = false;  ///< false before the start; then only `stats` means anything
+  NavState state;          ///< at the scan's end, frame odom
+  Matrix15d covariance = Matrix15d::Identity();
+  std::vector<CloudPoint> cloud;  ///< deskewed, in range, body frame at the scan's end
+  std::optional<Keyframe> keyframe;
+};
+
+/// What one IMU sample led to.
+struct ImuResult {
+  ImuFault fault = ImuFault::kNone;  ///< why the sample was not taken
+  std::optional<NavState> state;     ///< newest state, at this sample; empty before the start or after a fault
+  std::vector<ScanResult> scans;     ///< scans that this sample completed, oldest first
+};
+
+struct LioStatus {
+  bool running = false;
+  std::string text;  ///< what is being waited for, what was refused, or how it started
+};
+
+/// LiDAR-inertial odometry: an error-state Kalman filter driven by the IMU and corrected by scans against a local map.
+///
+/// Two states are kept. The committed one ends at the last scan and carries the covariance. The live one runs ahead of
+/// it to the newest IMU sample and is rebuilt whenever a scan arrives. A scan is processed as soon as both it and the
+/// IMU data up to its end are there, so scan results do not depend on how the two streams interleave, as long as a scan
+/// is at most `max_scan_delay_s` late. Not for concurrent use. Holds no clock: time is what the stamps say.
+class Lio {
+ public:
+  explicit Lio(const FrontendConfig& config);
+
+  [[nodiscard]] ImuResult add_imu(const ImuSample& sample);
+  [[nodiscard]] std::vector<ScanResult> add_scan(Scan scan);
+
+  /// Forgets everything and starts a new session.
+  void reset();
+
+  [[nodiscard]] LioStatus status() const { return {running_, initialisation_.report()}; }
+  [[nodiscard]] const ImuCounters& imu_counters() const { return imu_.counters(); }
+  [[nodiscard]] std::int32_t session() const { return session_; }
+  [[nodiscard]] const LocalMap& map() const { return map_; }
+
+ private:
+  [[nodiscard]] std::vector<ScanResult> process_pending();
+  [[nodiscard]] ScanResult process(const Scan& scan);
+  [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
+  [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud);
+  void grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason);
+  void follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud);
+  void advance_to(Utime utime);
+  void rebuild_live_state();
+  [[nodiscard]] double noise_scale(std::size_t sample_after) const;
+
+  FrontendConfig config_;
+  std::int32_t session_ = 0;
+  ImuBuffer imu_;
+  ImuInitialisation initialisation_;
+  ScanMatcher matcher_;
+  LocalMap map_;
+  Keyframer keyframer_;
+  std::deque<Scan> pending_;
+  std::optional<Utime> last_scan_end_;  ///< of the newest scan that was taken into the queue
+  bool running_ = false;
+  FilterState filter_;  ///< committed
+  NavState live_;
+  bool velocity_known_ = false;
+  int applied_scans_ = 0;
+  int contradictions_ = 0;  ///< in a row
+};
+
+}  // namespace ignis

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/plane_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace ignis {
+
+PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config) {
+  PlaneFit fit;
+  if (moments.count < config.min_plane_points) return fit;
+
+  const double inverse_count = 1.0 / moments.count;
+  fit.offset = moments.sum * inverse_count;
+  const Eigen::Matrix3d scatter = moments.sum_outer * inverse_count - fit.offset * fit.offset.transpose();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(scatter);
+  const Eigen::Vector3d lambda = solver.eigenvalues().cwiseMax(0.0);
+  fit.normal = solver.eigenvectors().col(0);
+
+  const double tangential = (fit.offset - fit.normal * fit.normal.dot(fit.offset)).norm();
+  if (!(lambda[0] < config.max_curvature * lambda[2])) {
+    fit.verdict = PlaneVerdict::kBlob;
+  } else if (!(lambda[1] > config.min_spread * lambda[2])) {
+    fit.verdict = PlaneVerdict::kLine;
+  } else if (!(tangential <= config.max_centroid_offset * config.match_radius_m)) {
+    fit.verdict = PlaneVerdict::kOneSided;
+  } else if (!(std::sqrt(lambda[0]) <= config.max_surface_roughness)) {
+    fit.verdict = PlaneVerdict::kRough;
+  } else {
+    fit.verdict = PlaneVerdict::kPlane;
+  }
+  return fit;
+}
+
+}  // namespace ignis

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "frontend/frontend_config.h"
+
+namespace ignis {
+
+/// Sums over the neighbours of a query point, relative to that point: all that a plane fit needs, so that no list of
+/// neighbours is ever built.
+struct NeighbourMoments {
+  int count = 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();        ///< [m] of (neighbour - query)
+  Eigen::Matrix3d sum_outer = Eigen::Matrix3d::Zero();  ///< [m^2]
+
+  void add(const Eigen::Vector3d& offset) {
+    ++count;
+    sum += offset;
+    sum_outer += offset * offset.transpose();
+  }
+};
+
+enum class PlaneVerdict { kPlane, kTooFewPoints, kBlob, kLine, kOneSided, kRough };
+
+/// A plane near a query point.
+struct PlaneFit {
+  PlaneVerdict verdict = PlaneVerdict::kTooFewPoints;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, sign arbitrary
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< [m] centroid of the neighbours minus the query point
+};
+
+/// Principal component fit with the reference's gates: number, curvature, spread, one-sidedness, roughness.
+///
+/// One-sidedness is measured within the plane. The part along the normal is the residual itself: counting it would
+/// throw away all planes as soon as the prediction is off by more than the gate.
+[[nodiscard]] PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config);
+
+}  // namespace ignis

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/scan_matcher.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+// Below these the next pass would change nothing that matters.
+constexpr double kConvergedPosition = 1e-4;  // m
+constexpr double kConvergedAngle = 1e-5;     // rad
+// A normal "touches" a world axis when its component exceeds this; every unit vector touches at least one.
+constexpr double kTouch = 0.5;
+
+Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, const Eigen::Vector3d& normal) {
+  Vector6d h;
+  h << point_body.cross(R.transpose() * normal), normal;
+  return h;
+}
+
+double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
+  const Eigen::Matrix3d part = covariance.block<3, 3>(block, block);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(part, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(solver.eigenvalues()[2], 0.0));
+}
+
+}  // namespace
+
+ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config) { config::require_valid(config, "frontend"); }
+
+MatchResult ScanMatcher::match(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
+                               const LocalMap& map) {
+  MatchResult result{predicted, {}, Matrix6d::Zero()};
+  associate(predicted.nominal.T_odom_body, points_body, map);
+  result.stats.matched = static_cast<int>(constraints_.size());
+  if (result.stats.matched < config_.min_matches) {
+    result.stats.reason = ScanReason::kTooFewMatches;
+    return result;
+  }
+  const Assessment assessment = assess(predicted);
+  result.stats.mean_innovation = assessment.mean_innovation;
+  result.stats.observability = assessment.observability;
+  const bool iterated = iterate(predicted, points_body, map, result);
+  result.stats.degenerate_directions = degeneracy_.degenerate_directions;
+  result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
+  if (!result.stats.applied()) {
+    result.filter = predicted;
+    result.information_body.setZero();
+  }
+  return result;
+}
+
+void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
+  constraints_.clear();
+  const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
+  double range_sum = 0.0;
+  for (const Eigen::Vector3f& point : points_body) {
+    const Eigen::Vector3d point_body = point.cast<double>();
+    const Eigen::Vector3d query = R * point_body + pose.translation;
+    const PlaneFit plane = fit_plane(map.gather(query), config_);
+    if (plane.verdict != PlaneVerdict::kPlane) continue;
+    constraints_.push_back({point_body, plane.normal, plane.normal.dot(query + plane.offset), 1.0});
+    range_sum += point_body.norm();
+  }
+  mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / static_cast<double>(constraints_.size()), 0.1);
+}
+
+ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
+  const Pose& pose = predicted.nominal.T_odom_body;
+  const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
+  const Matrix6d P = predicted.covariance.topLeftCorner<6, 6>();
+  const auto count = static_cast<double>(constraints_.size());
+  Assessment assessment;
+  Matrix6d sensitivity = Matrix6d::Zero();
+  for (const Constraint& constraint : constraints_) {
+    const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
+    const double z = constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance;
+    assessment.mean_innovation += std::abs(z) / count;
+    assessment.observability += constraint.normal.cwiseAbs2() / count;
+    sensitivity += h * h.transpose() / count;
+  }
+  // trace(P S) is the mean of h^T P h over the points.
+  assessment.expected_innovation = std::sqrt(std::max((P * sensitivity).trace(), 0.0));
+  degeneracy_ = analyse_degeneracy(sensitivity, mean_range_, config_.degeneracy_threshold);
+  weigh(assessment.observability);
+  return assessment;
+}
+
+void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
+  // The reference compares with the dominant axis, which starves walls under a large ceiling although they are many. An
+  // axis with `full_observability` of all information is trusted in full; 1 gives back the reference's rule.
+  const double full = std::min(observability.maxCoeff(), config_.full_observability);
+  for (Constraint& constraint : constraints_) {
+    double weakest = full;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(constraint.normal[axis]) > kTouch) weakest = std::min(weakest, observability[axis]);
+    }
+    constraint.weight = full > 0.0 ? std::max(weakest / full, config_.min_observability) : 1.0;
+  }
+}
+
+double ScanMatcher::point_variance(const Pose& pose) const {
+  if (!config_.adapt_measurement_noise) return config_.measurement_noise;
+  // Posterior mean of a variance whose prior is the configured value, worth `noise_prior_points` observations.
+  double sum = config_.noise_prior_points * config_.measurement_noise;
+  for (const Constraint& constraint : constraints_) {
+    const double z = constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance;
+    sum += config_.residual_inflation * z * z;
+  }
+  const double variance = sum / (config_.noise_prior_points + static_cast<double>(constraints_.size()));
+  return std::min(variance, config_.measurement_noise);
+}
+
+PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_covariance) const {
+  const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
+  const double gate2 = config_.max_innovation_sigma * config_.max_innovation_sigma;
+  const double base_variance = point_variance(pose);
+  PoseInformation sum;
+  for (const Constraint& constraint : constraints_) {
+    const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
+    const double z = constraint.normal.dot(R * constraint.point_body + pose.translation) - constraint.plane_distance;
+    const double variance = base_variance / constraint.weight;
+    if (z * z > gate2 * (h.dot(pose_covariance * h) + variance)) continue;
+    sum.add(h, z, variance);
+  }
+  return sum;
+}
+
+bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
+                          const LocalMap& map, MatchResult& result) {
+  FilterState& iterate = result.filter;
+  Pose associated_at = predicted.nominal.T_odom_body;
+  Matrix15d gate_covariance = predicted.covariance;
+  for (int pass = 0; pass < config_.iterations; ++pass) {
+    const Vector6d moved = body_difference(associated_at, iterate.nominal.T_odom_body);
+    if (moved.tail<3>().norm() + mean_range_ * moved.head<3>().norm() > 0.5 * config_.voxel_size_m) {
+      associate(iterate.nominal.T_odom_body, points_body, map);
+      if (static_cast<int>(constraints_.size()) < config_.min_matches) return false;
+      (void)assess(iterate);
+      associated_at = iterate.nominal.T_odom_body;
+    }
+    const PoseInformation sum =
+        accumulate(iterate.nominal.T_odom_body, gate_covariance.topLeftCorner<6, 6>()).projected(degeneracy_.projector);
+    const UpdateStep update =
+        information_update(predicted.covariance, difference(predicted.nominal, iterate.nominal), sum);
+    if (!update.ok) return false;
+    iterate.nominal = perturbed(iterate.nominal, update.step);
+    iterate.covariance = update.covariance;
+    gate_covariance = update.covariance;
+
+    Matrix6d to_odom = Matrix6d::Identity();
+    to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
+    result.information_body = to_odom.transpose() * sum.information * to_odom;
+    result.stats.used = sum.count;
+    if (update.step.segment<3>(kPosition).norm() < kConvergedPosition &&
+        update.step.segment<3>(kAttitude).norm() < kConvergedAngle) {
+      break;
+    }
+  }
+  const Vector15d total = difference(predicted.nominal, iterate.nominal);
+  result.stats.correction_m = total.segment<3>(kPosition).norm();
+  result.stats.correction_rad = total.segment<3>(kAttitude).norm();
+  result.stats.velocity_correction = total.segment<3>(kVelocity).norm();
+  result.stats.mean_residual = mean_residual(iterate.nominal.T_odom_body);
+  return true;
+}
+
+double ScanMatcher::mean_residual(const Pose& pose) const {
+  double sum = 0.0;
+  for (const Constraint& constraint : constraints_) {
+    sum += std::abs(constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance);
+  }
+  return constraints_.empty() ? 0.0 : sum / static_cast<double>(constraints_.size());
+}
+
+ScanReason ScanMatcher::judge(const FilterState& predicted, const Assessment& assessment,
+                              const MatchResult& result) const {
+  // A bound is never tighter than what the prediction itself calls likely: after a moving start or a stretch without
+  // scans, a large correction is what the covariance announces, not a sign of a bad map.
+  const double sigmas = config_.max_innovation_sigma;
+  const double innovation_limit = std::max(config_.max_mean_innovation, sigmas * assessment.expected_innovation);
+  const double position_limit =
+      std::max(config_.max_scan_correction_m, sigmas * largest_sigma(predicted.covariance, kPosition));
+  const double velocity_limit =
+      std::max(config_.max_scan_velocity_corr, sigmas * largest_sigma(predicted.covariance, kVelocity));
+  if (degeneracy_.degenerate_directions == 6) return ScanReason::kUnobservable;
+  if (assessment.mean_innovation > innovation_limit) return ScanReason::kInnovationTooLarge;
+  // Whatever the prediction was worth, the corrected pose has to fit the map.
+  if (result.stats.mean_residual > config_.max_mean_innovation) return ScanReason::kInnovationTooLarge;
+  if (result.stats.correction_m > position_limit) return ScanReason::kCorrectionTooLarge;
+  if (result.stats.velocity_correction > velocity_limit) return ScanReason::kVelocityCorrectionTooLarge;
+  return ScanReason::kApplied;
+}
+
+}  // namespace ignis

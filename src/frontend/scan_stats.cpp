@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/scan_stats.h"
+
+namespace ignis {
+
+std::string_view text(ScanReason reason) {
+  switch (reason) {
+    case ScanReason::kApplied:
+      return "applied";
+    case ScanReason::kNotInitialised:
+      return "not initialised yet";
+    case ScanReason::kTooFewPoints:
+      return "too few points in range";
+    case ScanReason::kTooFewMatches:
+      return "too few points found a plane";
+    case ScanReason::kInnovationTooLarge:
+      return "mean point-to-plane distance too large";
+    case ScanReason::kUnobservable:
+      return "no direction is observable";
+    case ScanReason::kCorrectionTooLarge:
+      return "position correction outside the trust region";
+    case ScanReason::kVelocityCorrectionTooLarge:
+      return "velocity correction outside the trust region";
+    case ScanReason::kMatchingDisabled:
+      return "scan matching is switched off";
+    case ScanReason::kMapEmpty:
+      return "local map is empty";
+    case ScanReason::kBadStamp:
+      return "stamp out of order or too old";
+    case ScanReason::kNoImu:
+      return "no IMU data cover the scan";
+    case ScanReason::kNumericalFailure:
+      return "numerical failure";
+  }
+  return "unknown reason";
+}
+
+bool is_contradiction(ScanReason reason) {
+  return reason == ScanReason::kInnovationTooLarge || reason == ScanReason::kCorrectionTooLarge ||
+         reason == ScanReason::kVelocityCorrectionTooLarge || reason == ScanReason::kNumericalFailure;
+}
+
+}  // namespace ignis

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include <Eigen/Core>
+
+#include "common/pose.h"
+#include "common/time.h"
+
+namespace ignis {
+
+/// Why a scan did or did not correct the state. Values and order are those of lcmtypes/scan_stats_t.lcm.
+enum class ScanReason : std::int8_t {
+  kApplied = 0,
+  kNotInitialised = 1,
+  kTooFewPoints = 2,
+  kTooFewMatches = 3,
+  kInnovationTooLarge = 4,
+  kUnobservable = 5,
+  kCorrectionTooLarge = 6,
+  kVelocityCorrectionTooLarge = 7,
+  kMatchingDisabled = 8,
+  kMapEmpty = 9,
+  kBadStamp = 10,
+  kNoImu = 11,
+  kNumericalFailure = 12,
+};
+
+/// The reason in words.
+[[nodiscard]] std::string_view text(ScanReason reason);
+
+/// True for reasons that say: this scan and the map (or the prediction) contradict each other.
+[[nodiscard]] bool is_contradiction(ScanReason reason);
+
+/// What the front end did with one scan.
+struct ScanStats {
+  Utime utime = 0;  ///< [us] end of the scan
+  std::int32_t scan_sequence = 0;
+  std::int32_t session = 0;  ///< +1 per reset
+  ScanReason reason = ScanReason::kNotInitialised;
+  int points = 0;                    ///< after the range filter
+  int matched = 0;                   ///< points that found a plane
+  int used = 0;                      ///< of these, inside the Mahalanobis gate in the last pass
+  double mean_innovation = 0.0;      ///< [m] mean absolute distance at the predicted pose
+  double mean_residual = 0.0;        ///< [m] the same at the corrected pose
+  double correction_m = 0.0;         ///< [m] applied or, when refused by the trust region, asked for
+  double correction_rad = 0.0;       ///< [rad]
+  double velocity_correction = 0.0;  ///< [m/s]
+  Eigen::Vector3d observability = Eigen::Vector3d::Zero();  ///< diagonal of sum(n n^T) over its trace, world axes
+  int degenerate_directions = 0;                            ///< eigen-directions left to the IMU
+  Pose T_odom_body;                                         ///< after this scan
+  int map_points = 0;                                       ///< in the local map, after this scan
+
+  [[nodiscard]] bool applied() const { return reason == ScanReason::kApplied; }
+};
+
+}  // namespace ignis

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/scan_update.h"
+
+#include <Eigen/LU>
+
+#include "common/so3.h"
+
+namespace ignis {
+
+PoseInformation PoseInformation::projected(const Matrix6d& projector) const {
+  PoseInformation result = *this;
+  result.information = projector.transpose() * information * projector;
+  result.gradient = projector.transpose() * gradient;
+  return result;
+}
+
+UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
+                              const PoseInformation& constraints) {
+  // The prior's error in coordinates of the iterate's tangent space: only attitude is curved.
+  Matrix15d to_iterate = Matrix15d::Identity();
+  to_iterate.block<3, 3>(kAttitude, kAttitude) = so3::right_jacobian(deviation.segment<3>(kAttitude));
+  const Matrix15d P = to_iterate * prior_covariance * to_iterate.transpose();
+  const Vector15d d = to_iterate * deviation;
+
+  const Matrix6d& A = constraints.information;
+  const Eigen::Matrix<double, 15, 6> P6 = P.leftCols<6>();
+  const Matrix6d damped = Matrix6d::Identity() + A * P.topLeftCorner<6, 6>();
+  Matrix6d M = damped.partialPivLu().solve(A);
+  M = (0.5 * (M + M.transpose())).eval();
+
+  UpdateStep update;
+  update.covariance = P - P6 * M * P6.transpose();
+  update.ok = make_symmetric(update.covariance);
+  const Vector15d restored = d - P6 * (M * d.head<6>());
+  update.step = -(update.covariance.leftCols<6>() * constraints.gradient) - restored;
+  update.ok = update.ok && update.step.allFinite();
+  return update;
+}
+
+}  // namespace ignis

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "common/pose.h"
+#include "frontend/eskf.h"
+
+namespace ignis {
+
+/// Point-to-plane constraints summed in information form. Order of the 6: attitude (body axes), position (odom axes).
+struct PoseInformation {
+  Matrix6d information = Matrix6d::Zero();  ///< sum of h h^T / r
+  Vector6d gradient = Vector6d::Zero();     ///< sum of h z / r
+  int count = 0;
+
+  void add(const Vector6d& h, double residual, double variance) {
+    information += h * (h.transpose() / variance);
+    gradient += h * (residual / variance);
+    ++count;
+  }
+  /// Keeps the part that lies in the image of the projector (see degeneracy.h).
+  [[nodiscard]] PoseInformation projected(const Matrix6d& projector) const;
+};
+
+/// One Gauss-Newton step of the iterated error-state update.
+struct UpdateStep {
+  Vector15d step = Vector15d::Zero();            ///< error that moves the iterate
+  Matrix15d covariance = Matrix15d::Identity();  ///< posterior, in the tangent space of the iterate
+  bool ok = false;                               ///< false: the result is not finite or not positive
+};
+
+/// Minimises |x - prior|^2 in the prior's covariance plus the constraints, linearised at the iterate, where
+/// `deviation` = difference(prior, iterate). With the constraints in six columns only, the 15x15 system reduces to one
+/// 6x6 solve, and the prior covariance is never inverted:
+///   M = (I + A P66)^-1 A,  P+ = P - P6 M P6^T,  step = -P+6 b - (d - P6 M d6).
+/// Equal to processing the points one at a time with scalar Kalman gains.
+/// Equations: W. Xu, F. Zhang, "FAST-LIO", RA-L 2021, eqs. 16-20, rearranged with the matrix inversion lemma.
+[[nodiscard]] UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
+                                            const PoseInformation& constraints);
+
+}  // namespace ignis

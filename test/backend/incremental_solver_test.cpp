@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/incremental_solver.h"
+
+#include <gtsam/geometry/Pose3.h>
+#include <gtsam/inference/Symbol.h>
+#include <gtsam/nonlinear/NonlinearFactorGraph.h>
+#include <gtsam/nonlinear/PriorFactor.h>
+#include <gtsam/nonlinear/Values.h>
+#include <gtsam/slam/BetweenFactor.h>
+
+#include <cmath>
+
+#include "backend/relative_pose_factor.h"
+#include "backend/text_contains.h"
+
+namespace ignis {
+namespace {
+
+using testing::contains;
+
+using gtsam::Pose3;
+using gtsam::symbol_shorthand::X;
+
+const auto kNoise = gtsam::noiseModel::Isotropic::Sigma(6, 0.1);
+
+Pose3 step() { return {gtsam::Rot3::Ry(0.1), {0.1, 0.0, -1.0}}; }
+
+/// A chain of poses as the solver should see it, and the same one for the test to solve.
+class SolverChain {
+ public:
+  void add(int i) {
+    gtsam::NonlinearFactorGraph factors;
+    gtsam::Values values;
+    values.insert(X(i), i == 0 ? Pose3() : solver.estimate().at<Pose3>(X(i - 1)) * step());
+    if (i == 0) {
+      factors.addPrior(X(0), Pose3(), kNoise);
+    } else {
+      factors.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(i - 1), X(i), step(), kNoise);
+    }
+    outcome = solver.add(factors, values);
+  }
+  void extend_to(int count) {
+    for (int i = static_cast<int>(solver.estimate().size()); i < count; ++i) add(i);
+  }
+  Pose3 pose(int i) { return solver.estimate().at<Pose3>(X(i)); }
+
+  IncrementalSolver solver{SolverConfig()};
+  SolverOutcome outcome;
+};
+
+void expect_good_chain(SolverChain& chain, int count) {
+  Pose3 expected;
+  for (int i = 0; i < count; ++i) {
+    EXPECT_TRUE(chain.pose(i).equals(expected, 1e-6)) << i;
+    expected = expected * step();
+  }
+}
+
+TEST(IncrementalSolver, SurvivesAnExceptionAndGoesOn) {
+  SolverChain chain;
+  chain.extend_to(20);
+  // A pose that only its position holds: iSAM2 throws in the middle of the update and is broken afterwards.
+  gtsam::NonlinearFactorGraph factors;
+  gtsam::Values values;
+  WhiteningRows position_only = WhiteningRows::Zero(3, 6);
+  position_only.rightCols<3>().setIdentity();
+  factors.push_back(make_relative_pose_factor(X(19), X(20), Pose(), position_only));
+  values.insert(X(20), chain.pose(19));
+  const SolverOutcome refused = chain.solver.add(factors, values);
+  EXPECT_FALSE(refused.accepted);
+  EXPECT_TRUE(contains(refused.reason, "undetermined near x"));
+  EXPECT_EQ(chain.solver.rebuilds(), 1);
+  EXPECT_EQ(chain.solver.estimate().size(), 20U);
+  chain.extend_to(40);
+  EXPECT_TRUE(chain.outcome.accepted);
+  expect_good_chain(chain, 40);
+  EXPECT_TRUE(chain.solver.marginal_covariance(X(39)));
+}
+
+TEST(IncrementalSolver, RemovesTheRightFactorAfterARebuild) {
+  SolverChain chain;
+  chain.extend_to(10);
+  gtsam::NonlinearFactorGraph pull;
+  pull.addPrior(X(9), Pose3(gtsam::Rot3(), {5.0, 5.0, 5.0}), kNoise);
+  const SolverOutcome pulled = chain.solver.add(pull, {});
+  ASSERT_TRUE(pulled.accepted);
+  gtsam::Values floating;
+  floating.insert(X(10), Pose3());
+  WhiteningRows one = WhiteningRows::Zero(1, 6);
+  one(0, 0) = 1.0;
+  gtsam::NonlinearFactorGraph weak;
+  weak.push_back(make_relative_pose_factor(X(9), X(10), Pose(), one));
+  ASSERT_FALSE(chain.solver.add(weak, floating).accepted);
+  ASSERT_TRUE(chain.solver.remove(pulled.factors).accepted);
+  chain.solver.settle(3);
+  expect_good_chain(chain, 10);
+  EXPECT_NEAR(chain.solver.half_chi_square(), 0.0, 1e-9);
+  EXPECT_FALSE(chain.solver.remove(pulled.factors).accepted) << "it is gone already";
+}
+
+TEST(IncrementalSolver, RefusesBeforeTheSolverSeesIt) {
+  SolverChain chain;
+  chain.extend_to(3);
+  const auto refusal = [&](const gtsam::NonlinearFactorGraph& factors, const gtsam::Values& values) {
+    const SolverOutcome outcome = chain.solver.add(factors, values);
+    EXPECT_FALSE(outcome.accepted);
+    return outcome.reason;
+  };
+  gtsam::Values twice;
+  twice.insert(X(2), Pose3());
+  EXPECT_TRUE(contains(refusal({}, twice), "x2 exists"));
+  gtsam::NonlinearFactorGraph unknown;
+  unknown.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(2), X(77), step(), kNoise);
+  EXPECT_TRUE(contains(refusal(unknown, {}), "unknown variable x77"));
+  gtsam::NonlinearFactorGraph not_a_number;
+  not_a_number.addPrior(X(2), Pose3(gtsam::Rot3(), {std::nan(""), 0.0, 0.0}), kNoise);
+  EXPECT_TRUE(contains(refusal(not_a_number, {}), "not finite"));
+  EXPECT_EQ(chain.solver.rebuilds(), 0);
+  chain.extend_to(6);
+  expect_good_chain(chain, 6);
+}
+
+TEST(IncrementalSolver, ConstrainsOnlyTheDirectionsGiven) {
+  IncrementalSolver solver{SolverConfig()};
+  gtsam::NonlinearFactorGraph factors;
+  gtsam::Values values;
+  values.insert(X(0), Pose3());
+  values.insert(X(1), step());
+  factors.addPrior(X(0), Pose3(), gtsam::noiseModel::Isotropic::Sigma(6, 1e-6));
+  factors.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(0), X(1), step(), kNoise);
+  Vector6d information = Vector6d::Constant(1e6);
+  information(5) = 0.0;
+  Pose T_0_1{step().rotation().toQuaternion(), step().translation()};
+  factors.push_back(make_relative_pose_factor(X(0), X(1), T_0_1, whitening(information.asDiagonal())));
+  ASSERT_TRUE(solver.add(factors, values).accepted);
+  const auto covariance = solver.marginal_covariance(X(1));
+  ASSERT_TRUE(covariance);
+  EXPECT_NEAR(std::sqrt((*covariance)(5, 5)), 0.1, 1e-4);
+  EXPECT_NEAR(std::sqrt((*covariance)(3, 3)), 1e-3, 1e-4);
+}
+
+}  // namespace
+}  // namespace ignis

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "backend/smoother.h"
+#include "backend/synthetic_drive.h"
+#include "common/fingerprint.h"
+
+/// Loops from the search to their withdrawal.
+namespace ignis {
+namespace {
+
+std::vector<Pose> poses_of(const Smoother& smoother) {
+  std::vector<Pose> poses;
+  for (const KeyframePose& pose : smoother.all_poses()) poses.push_back(pose.T_map_body);
+  return poses;
+}
+
+std::vector<Pose> odometry(const testing::Drive& drive) {
+  std::vector<Pose> poses;
+  for (const Keyframe& keyframe : drive.keyframes) poses.push_back(keyframe.state.T_odom_body);
+  return poses;
+}
+
+Smoother run(const testing::Drive& drive, const BackendConfig& config, std::vector<LoopResult>* loops = nullptr) {
+  Smoother smoother(config, LoopGates());
+  for (const Keyframe& keyframe : drive.keyframes) {
+    const SmootherUpdate update = smoother.add_keyframe(keyframe);
+    EXPECT_TRUE(update.accepted()) << update.reason;
+    if (loops != nullptr && update.loop) loops->push_back(*update.loop);
+  }
+  return smoother;
+}
+
+Matrix6d information(double sigma_rad, double sigma_m) {
+  Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad)),
+      Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m));
+  return diagonal.asDiagonal();
+}
+
+BackendConfig without_loops() {
+  BackendConfig config;
+  config.use_loop_closing = false;
+  return config;
+}
+
+TEST(SmootherLoops, RemoveTheDriftOfTwoLaps) {
+  const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 45, .cloud_points = 3000});
+  std::vector<LoopResult> loops;
+  const Smoother smoother = run(drive, BackendConfig(), &loops);
+  const double before = testing::position_error(odometry(drive), drive.T_world_body);
+  const double chain = testing::position_error(poses_of(run(drive, without_loops())), drive.T_world_body);
+  const double after = testing::position_error(poses_of(smoother), drive.T_world_body);
+  std::printf("position error: odometry %.3f m, smoothed without loops %.3f m, with %d loops %.3f m\n", before, chain,
+              smoother.stats().loops_kept, after);
+  EXPECT_GE(smoother.stats().loops_kept, 5);
+  EXPECT_EQ(smoother.stats().loops_withdrawn, 0);
+  EXPECT_LT(after, 0.4 * before);
+  EXPECT_LT(after, 0.4 * chain);
+  int previous = -100;
+  for (const LoopResult& loop : loops) {
+    if (!loop.accepted()) continue;
+    EXPECT_GE(loop.from_id - loop.to_id, 10);
+    EXPECT_GE(loop.from_id - previous, 2) << "spacing";
+    previous = loop.from_id;
+    const Pose T_true = drive.T_world_body[static_cast<std::size_t>(loop.to_id)].inverse() *
+                        drive.T_world_body[static_cast<std::size_t>(loop.from_id)];
+    EXPECT_LT(body_difference(T_true, loop.T_to_from).tail<3>().norm(), 0.1);
+  }
+}
+
+TEST(SmootherLoops, SayWhyThereIsNone) {
+  const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 30, .cloud_points = 1500});
+  std::vector<LoopResult> disabled;
+  std::vector<LoopResult> loops;
+  static_cast<void>(run(drive, without_loops(), &disabled));
+  static_cast<void>(run(drive, BackendConfig(), &loops));
+  const auto count = [](const std::vector<LoopResult>& all, LoopReason reason) {
+    return std::ranges::count(all, reason, &LoopResult::reason);
+  };
+  EXPECT_EQ(count(disabled, LoopReason::kDisabled), 30);
+  ASSERT_EQ(loops.size(), 30U);
+  EXPECT_GE(count(loops, LoopReason::kNoCandidate), 15);
+  EXPECT_GE(count(loops, LoopReason::kAccepted), 1);
+  EXPECT_GE(count(loops, LoopReason::kTooSoon), 1);
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    EXPECT_EQ(loops[i].keyframes, static_cast<int>(i) + 1);
+    EXPECT_FALSE(loops[i].reason_text.empty());
+  }
+}
+
+TEST(SmootherLoops, WithdrawAFalseOneBeforeAnyoneSeesIt) {
+  const testing::Drive drive = testing::make_drive({.seed = 6, .keyframes = 30});
+  Smoother smoother = run(drive, without_loops());
+  const auto before = poses_of(smoother);
+  Vector6d lie;
+  lie << 0.0, 0.3, 0.0, 2.0, 0.0, 2.2;
+  const Pose T_to_from = perturbed_in_body(before[2].inverse() * before[24], lie);
+  const SmootherUpdate update = smoother.add_loop({24, 2, T_to_from, information(0.003, 0.02)});
+  ASSERT_TRUE(update.loop);
+  EXPECT_EQ(update.loop->reason, LoopReason::kWithdrawn);
+  EXPECT_EQ(smoother.stats().loops_kept, 0);
+  EXPECT_EQ(smoother.stats().loops_withdrawn, 1);
+  const auto after = poses_of(smoother);
+  // What stays are the places at which iSAM2 has linearised.
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT((after[i].translation - before[i].translation).norm(), 0.01);
+}
+
+TEST(SmootherLoops, KeepATrueOneFoundElsewhere) {
+  const testing::Drive drive = testing::make_drive({.seed = 6, .keyframes = 30});
+  Smoother smoother = run(drive, without_loops());
+  const double before = testing::position_error(poses_of(smoother), drive.T_world_body);
+  const Pose T_to_from = drive.T_world_body[2].inverse() * drive.T_world_body[24];
+  const SmootherUpdate update = smoother.add_loop({24, 2, T_to_from, information(0.003, 0.02)});
+  EXPECT_TRUE(update.loop->accepted()) << update.loop->reason_text;
+  EXPECT_LT(testing::position_error(poses_of(smoother), drive.T_world_body), before);
+  const PoseGraph graph = smoother.pose_graph();
+  EXPECT_EQ(graph.vertices.size(), 30U);
+  ASSERT_EQ(graph.edges.size(), 30U);
+  EXPECT_TRUE(graph.edges.back().is_loop);
+  EXPECT_EQ(graph.edges.back().from, 2);
+  EXPECT_EQ(graph.edges.back().to, 24);
+}
+
+TEST(SmootherLoops, WithdrawAnEarlierOneOnceOthersContradictIt) {
+  const testing::Drive drive = testing::make_drive({.seed = 8, .keyframes = 42});
+  Smoother smoother = run(drive, without_loops());
+  // A lie that the drift of a lap could explain, told with more certainty than it deserves.
+  Vector6d lie = Vector6d::Zero();
+  lie(3) = 0.25;
+  const auto estimate = poses_of(smoother);
+  const Pose T_false = perturbed_in_body(estimate[1].inverse() * estimate[22], lie);
+  const SmootherUpdate trial = smoother.add_loop({22, 1, T_false, information(0.02, 0.01)});
+  ASSERT_TRUE(trial.loop->accepted()) << trial.loop->reason_text;
+  std::vector<LoopResult> withdrawn;
+  for (std::size_t from = 16; from < 42 && withdrawn.empty(); ++from) {
+    for (const std::size_t to : {std::size_t{0}, from - 15}) {
+      const Pose T_true = drive.T_world_body[to].inverse() * drive.T_world_body[from];
+      const SmootherUpdate update = smoother.add_loop(
+          {static_cast<std::int32_t>(from), static_cast<std::int32_t>(to), T_true, information(0.02, 0.1)});
+      withdrawn.insert(withdrawn.end(), update.withdrawn.begin(), update.withdrawn.end());
+    }
+  }
+  ASSERT_EQ(withdrawn.size(), 1U);
+  EXPECT_EQ(withdrawn[0].from_id, 22);
+  EXPECT_EQ(withdrawn[0].to_id, 1);
+  EXPECT_EQ(withdrawn[0].reason, LoopReason::kWithdrawn);
+}
+
+TEST(SmootherLoops, RefuseWhatTheGraphDoesNotHoldOrIsNotFinite) {
+  const testing::Drive drive = testing::make_drive({.keyframes = 12});
+  Smoother smoother = run(drive, without_loops());
+  const auto reason = [&](const LoopMeasurement& loop) { return smoother.add_loop(loop).loop->reason; };
+  EXPECT_EQ(reason({11, 99, Pose(), information(0.01, 0.01)}), LoopReason::kSolverRefused);
+  EXPECT_EQ(reason({11, 11, Pose(), information(0.01, 0.01)}), LoopReason::kSolverRefused);
+  EXPECT_EQ(reason({11, 0, Pose(), Matrix6d::Zero()}), LoopReason::kSolverRefused);
+  Pose broken;
+  broken.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(reason({11, 0, broken, information(0.01, 0.01)}), LoopReason::kSolverRefused);
+  EXPECT_EQ(smoother.stats().loops_kept, 0);
+}
+
+TEST(SmootherLoops, GiveTheSameBytesTwice) {
+  const auto fingerprint = [] {
+    const testing::Drive drive = testing::make_drive({.seed = 11, .keyframes = 40, .cloud_points = 2000});
+    const Smoother smoother = run(drive, BackendConfig());
+    EXPECT_GE(smoother.stats().loops_kept, 1);
+    Fingerprint print;
+    for (const KeyframePose& pose : smoother.all_poses()) {
+      for (const double v : pose.T_map_body.translation) print.add(v);
+      for (const double v : pose.T_map_body.rotation.coeffs()) print.add(v);
+    }
+    return print.text();
+  };
+  EXPECT_EQ(fingerprint(), fingerprint());
+}
+
+}  // namespace
+}  // namespace ignis

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/imu_initialisation.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "common/frames.h"
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+const Eigen::Quaterniond kTilted = frames::from_yaw_pitch_roll({0.0, 0.1, -0.2});
+const Eigen::Vector3d kGyroBias(0.01, -0.02, 0.015);
+
+using Distortion = std::function<void(ImuSample&, double)>;
+
+/// Feeds noisy samples of a tilted vehicle at rest, changed by `distort`; returns the first state if there is one.
+std::optional<FilterState> feed(ImuInitialisation& initialisation, double seconds, const Distortion& distort = {},
+                                std::uint32_t seed = 1, const Eigen::Vector3d& accel_bias = Eigen::Vector3d::Zero()) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < static_cast<int>(seconds * 250.0); ++i) {
+    ImuSample sample;
+    sample.utime = 4000 * (i + 1);
+    sample.gyro = kGyroBias;
+    sample.accel = kTilted.conjugate() * Eigen::Vector3d(0.0, 9.81, 0.0) + accel_bias;
+    for (int k = 0; k < 3; ++k) sample.gyro[k] += 0.003 * std::sqrt(250.0) * normal(random);
+    for (int k = 0; k < 3; ++k) sample.accel[k] += 0.06 * std::sqrt(250.0) * normal(random);
+    if (distort) distort(sample, i / 250.0);
+    if (auto state = initialisation.add(sample)) return state;
+  }
+  return std::nullopt;
+}
+
+std::string refusal(const Distortion& distort) {
+  ImuInitialisation initialisation{FrontendConfig{}};
+  EXPECT_FALSE(feed(initialisation, 2.0, distort).has_value());
+  return initialisation.report();
+}
+
+TEST(ImuInitialisation, FindsTiltAndGyroBiasAtRest) {
+  ImuInitialisation initialisation{FrontendConfig{}};
+  const auto state = feed(initialisation, 3.0);
+  ASSERT_TRUE(state.has_value());
+  EXPECT_LT(so3::log(kTilted.conjugate() * state->nominal.T_odom_body.rotation).norm(), 0.02);
+  EXPECT_NEAR(frames::to_yaw_pitch_roll(state->nominal.T_odom_body.rotation).yaw, 0.0, 1e-3);
+  EXPECT_LT((state->nominal.gyro_bias - kGyroBias).norm(), 0.01);
+  EXPECT_EQ(state->nominal.T_odom_body.translation.norm(), 0.0);
+  EXPECT_NE(initialisation.report().find("started at rest"), std::string::npos);
+}
+
+TEST(ImuInitialisation, CovarianceCoversTheTiltErrorOfAnAccelerometerBias) {
+  // NEES of tilt and accelerometer bias over seeds, with the bias drawn from its own prior.
+  const FrontendConfig config;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  double nees = 0.0;
+  constexpr int kRuns = 60;
+  for (int run = 0; run < kRuns; ++run) {
+    Eigen::Vector3d accel_bias;
+    for (int k = 0; k < 3; ++k) accel_bias[k] = config.accel_bias_sigma * normal(random);
+    ImuInitialisation initialisation(config);
+    const auto state = feed(initialisation, 2.0, {}, static_cast<std::uint32_t>(run), accel_bias);
+    ASSERT_TRUE(state.has_value()) << initialisation.report();
+    // Heading is free by definition: only the tilt part of the attitude error counts.
+    const Eigen::Quaterniond& q = state->nominal.T_odom_body.rotation;
+    Eigen::Vector3d tilt = so3::log(kTilted * q.conjugate());
+    tilt.y() = 0.0;
+    Eigen::Matrix<double, 6, 1> error;
+    error << q.conjugate() * tilt, accel_bias - state->nominal.accel_bias;
+    Matrix6d P;
+    P << state->covariance.block<3, 3>(kAttitude, kAttitude), state->covariance.block<3, 3>(kAttitude, kAccelBias),
+        state->covariance.block<3, 3>(kAccelBias, kAttitude), state->covariance.block<3, 3>(kAccelBias, kAccelBias);
+    nees += error.dot(P.inverse() * error) / kRuns;
+  }
+  // Six degrees of freedom, of which yaw has no error by definition: 5 expected; 60 runs have a sigma of 0.41.
+  EXPECT_GT(nees, 3.5);
+  EXPECT_LT(nees, 6.5);
+}
+
+TEST(ImuInitialisation, SaysGInsteadOfMetresPerSecondSquared) {
+  EXPECT_NE(refusal([](ImuSample& s, double) { s.accel /= 9.81; }).find("looks like g instead of m/s^2"),
+            std::string::npos);
+}
+
+TEST(ImuInitialisation, SaysDegreesInsteadOfRadians) {
+  EXPECT_NE(refusal([](ImuSample& s, double) { s.gyro *= 57.3; }).find("degrees per second"), std::string::npos);
+}
+
+TEST(ImuInitialisation, SaysScaleWhenGravityIsWrong) {
+  EXPECT_NE(refusal([](ImuSample& s, double) { s.accel *= 1.2; }).find("scale"), std::string::npos);
+}
+
+TEST(ImuInitialisation, SaysAxesWhenGravityPointsElsewhere) {
+  EXPECT_NE(refusal([](ImuSample& s, double) { s.accel = -s.accel; }).find("axes"), std::string::npos);
+  EXPECT_NE(refusal([](ImuSample& s, double) { std::swap(s.accel.x(), s.accel.y()); }).find("axes"), std::string::npos);
+}
+
+TEST(ImuInitialisation, RefusesATurningVehicle) {
+  EXPECT_NE(refusal([](ImuSample& s, double) { s.gyro.y() += 0.15; }).find("turning"), std::string::npos);
+}
+
+TEST(ImuInitialisation, RefusesAnAcceleratingVehicle) {
+  EXPECT_NE(refusal([](ImuSample& s, double t) { s.accel.z() -= t; }).find("moving"), std::string::npos);
+}
+
+TEST(ImuInitialisation, KeepsWaitingAndStartsOnceItIsStill) {
+  ImuInitialisation initialisation{FrontendConfig{}};
+  const auto state = feed(initialisation, 6.0, [](ImuSample& s, double t) {
+    if (t < 2.0) s.gyro.y() += 0.5;
+  });
+  ASSERT_TRUE(state.has_value());
+  EXPECT_GT(state->nominal.utime, 3'300'000);
+  EXPECT_LT((state->nominal.gyro_bias - kGyroBias).norm(), 0.02) << "the motion must not end up in the bias";
+}
+
+TEST(ImuInitialisation, MovingStartLeavesTheVelocityOpen) {
+  FrontendConfig config;
+  config.start = "moving";
+  config.start_seconds = 0.2;
+  ImuInitialisation initialisation(config);
+  const auto state = feed(initialisation, 1.0, [](ImuSample& s, double) { s.gyro.y() += 0.5; });
+  ASSERT_TRUE(state.has_value());
+  EXPECT_NEAR(std::sqrt(state->covariance(kVelocity, kVelocity)), config.moving_velocity_sigma, 1e-9);
+  EXPECT_EQ(state->nominal.gyro_bias.norm(), 0.0);
+  EXPECT_NE(initialisation.report().find("started moving"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace ignis

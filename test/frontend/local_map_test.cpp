@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/local_map.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+std::vector<Eigen::Vector3f> random_points(std::uint32_t seed, int count, float half) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform(-half, half);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < count; ++i) {
+    const float x = uniform(random);
+    const float y = uniform(random);
+    const float z = uniform(random);
+    points.emplace_back(x, y, z);
+  }
+  return points;
+}
+
+TEST(LocalMap, GathersExactlyWhatABruteForceSearchFinds) {
+  const FrontendConfig config;
+  LocalMap map(config);
+  map.insert(random_points(1, 20000, 4.0F), {so3::exp({0.1, 0.2, 0.3}), {100.0, -3.0, -50.0}}, true);
+  const std::vector<Eigen::Vector3d> all = map.points();
+  ASSERT_EQ(static_cast<int>(all.size()), map.size());
+  for (const Eigen::Vector3f& offset : random_points(2, 200, 5.0F)) {
+    const Eigen::Vector3d query = Eigen::Vector3d(100.0, -3.0, -50.0) + offset.cast<double>();
+    NeighbourMoments expected;
+    for (const Eigen::Vector3d& point : all) {
+      if ((point - query).norm() <= config.match_radius_m) expected.add(point - query);
+    }
+    const NeighbourMoments found = map.gather(query);
+    EXPECT_EQ(found.count, expected.count);
+    EXPECT_LT((found.sum - expected.sum).norm(), 1e-4);
+    EXPECT_LT((found.sum_outer - expected.sum_outer).norm(), 1e-4);
+  }
+}
+
+TEST(LocalMap, KeepsThePointNearestTheVoxelCentre) {
+  LocalMap map(FrontendConfig{});
+  map.insert(std::vector<Eigen::Vector3f>{{0.01F, 0.01F, 0.01F}, {0.11F, 0.1F, 0.1F}, {0.15F, 0.1F, 0.1F}}, {}, true);
+  ASSERT_EQ(map.size(), 1);
+  EXPECT_LT((map.points()[0] - Eigen::Vector3d(0.11, 0.1, 0.1)).norm(), 1e-6);
+}
+
+TEST(LocalMap, HandlesNegativeCoordinates) {
+  LocalMap map(FrontendConfig{});
+  map.insert(std::vector<Eigen::Vector3f>{{-0.05F, -0.05F, -0.05F}, {0.05F, 0.05F, 0.05F}}, {}, true);
+  EXPECT_EQ(map.size(), 2);
+  EXPECT_EQ(map.gather(Eigen::Vector3d::Zero()).count, 2);
+}
+
+TEST(LocalMap, UnconfirmedPointsHaveNoVoteUntilAnAgreeingScanReplacesThem) {
+  LocalMap map(FrontendConfig{});
+  map.insert(std::vector<Eigen::Vector3f>{{0.1F, 0.1F, 0.1F}}, {}, false);
+  EXPECT_EQ(map.size(), 1);
+  EXPECT_EQ(map.gather({0.1, 0.1, 0.1}).count, 0);
+  map.insert(std::vector<Eigen::Vector3f>{{0.02F, 0.02F, 0.02F}}, {}, true);
+  EXPECT_EQ(map.size(), 1);
+  EXPECT_EQ(map.gather({0.1, 0.1, 0.1}).count, 1);
+  EXPECT_LT((map.points()[0] - Eigen::Vector3d(0.02, 0.02, 0.02)).norm(), 1e-6);
+}
+
+TEST(LocalMap, UnconfirmedPointsNeverReplaceConfirmedOnes) {
+  LocalMap map(FrontendConfig{});
+  map.insert(std::vector<Eigen::Vector3f>{{0.02F, 0.02F, 0.02F}}, {}, true);
+  map.insert(std::vector<Eigen::Vector3f>{{0.1F, 0.1F, 0.1F}}, {}, false);
+  EXPECT_LT((map.points()[0] - Eigen::Vector3d(0.02, 0.02, 0.02)).norm(), 1e-6);
+}
+
+TEST(LocalMap, SlidesOnlyAfterAQuarterOfTheWindow) {
+  FrontendConfig config;
+  LocalMap map(config);
+  map.slide(Eigen::Vector3d::Zero());
+  map.insert(random_points(3, 5000, 18.0F), {}, true);
+  const int before = map.size();
+  map.slide({4.9, 0.0, 0.0});
+  EXPECT_EQ(map.size(), before);
+  const Eigen::Vector3d position(5.1, 0.0, 0.0);
+  map.slide(position);
+  EXPECT_LT(map.size(), before);
+  for (const Eigen::Vector3d& point : map.points()) {
+    EXPECT_LE(std::abs(point.x() - position.x()), config.map_window_m);
+    EXPECT_LE(std::abs(point.y()), config.map_window_y);
+  }
+  const auto all = map.points();
+  const NeighbourMoments found = map.gather(all.front());
+  EXPECT_GE(found.count, 1) << "the table must find what is left after a prune";
+}
+
+TEST(LocalMap, StaysBoundedOnALongDrive) {
+  LocalMap map(FrontendConfig{});
+  int largest = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Pose T_odom_body{Eigen::Quaterniond::Identity(), {2.0 * i, 0.0, 0.0}};
+    map.insert(random_points(static_cast<std::uint32_t>(i), 500, 10.0F), T_odom_body, true);
+    map.slide(T_odom_body.translation);
+    largest = std::max(largest, map.size());
+  }
+  EXPECT_LT(largest, 500 * 20);
+}
+
+TEST(LocalMap, RefusesAnImpossibleConfiguration) {
+  FrontendConfig config;
+  config.voxel_size_m = 0.0;
+  config.iterations = 0;
+  try {
+    LocalMap map(config);
+    FAIL() << "accepted";
+  } catch (const config::ConfigError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("frontend.voxel_size_m"), std::string::npos);
+    EXPECT_NE(message.find("frontend.iterations"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace ignis

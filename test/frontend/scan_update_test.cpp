@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/scan_update.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "common/so3.h"
+#include "frontend/degeneracy.h"
+
+namespace ignis {
+namespace {
+
+struct ScalarConstraint {
+  Vector6d h;
+  double z;
+  double variance;
+};
+
+/// The reference's update: one point at a time with a scalar Kalman gain, all linearised at the prior.
+UpdateStep update_points(const Matrix15d& prior, const std::vector<ScalarConstraint>& constraints) {
+  UpdateStep result;
+  result.covariance = prior;
+  for (const ScalarConstraint& constraint : constraints) {
+    Vector15d H = Vector15d::Zero();
+    H.head<6>() = constraint.h;
+    const Vector15d PH = result.covariance * H;
+    const double S = H.dot(PH) + constraint.variance;
+    const Vector15d K = PH / S;
+    result.step -= K * (constraint.z + H.dot(result.step));
+    result.covariance = (Matrix15d::Identity() - K * H.transpose()) * result.covariance;
+  }
+  return result;
+}
+
+Matrix15d random_covariance(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  const Matrix15d A = Matrix15d::NullaryExpr([&] { return 0.05 * normal(random); });
+  return A * A.transpose() + 1e-6 * Matrix15d::Identity();
+}
+
+std::vector<ScalarConstraint> random_constraints(std::mt19937& random, int count) {
+  std::normal_distribution<double> normal;
+  std::vector<ScalarConstraint> constraints;
+  for (int i = 0; i < count; ++i) {
+    const Vector6d h = Vector6d::NullaryExpr([&] { return normal(random); });
+    constraints.push_back({h, 0.02 * normal(random), 0.01 * (1.0 + i % 3)});
+  }
+  return constraints;
+}
+
+PoseInformation summed(const std::vector<ScalarConstraint>& constraints) {
+  PoseInformation sum;
+  for (const ScalarConstraint& constraint : constraints) sum.add(constraint.h, constraint.z, constraint.variance);
+  return sum;
+}
+
+TEST(ScanUpdate, InformationFormEqualsScalarUpdates) {
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Matrix15d prior = random_covariance(random);
+    const std::vector<ScalarConstraint> constraints = random_constraints(random, 1 + 20 * trial);
+    const UpdateStep scalar = update_points(prior, constraints);
+    const UpdateStep information = information_update(prior, Vector15d::Zero(), summed(constraints));
+    ASSERT_TRUE(information.ok);
+    EXPECT_LT((scalar.step - information.step).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT((scalar.covariance - information.covariance).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
+TEST(ScanUpdate, LaterPassIsTheMinimumOfPriorPlusConstraints) {
+  // Normal equations with an explicit inverse of the prior, at an iterate away from it.
+  std::mt19937 random(2);
+  const Matrix15d prior = random_covariance(random);
+  const PoseInformation sum = summed(random_constraints(random, 50));
+  Vector15d deviation = Vector15d::LinSpaced(-0.05, 0.08);
+  const UpdateStep update = information_update(prior, deviation, sum);
+
+  Matrix15d J = Matrix15d::Identity();
+  J.block<3, 3>(kAttitude, kAttitude) = so3::right_jacobian_inverse(deviation.segment<3>(kAttitude));
+  Matrix15d normal = J.transpose() * prior.inverse() * J;
+  Vector15d gradient = J.transpose() * prior.inverse() * deviation;
+  normal.topLeftCorner<6, 6>() += sum.information;
+  gradient.head<6>() += sum.gradient;
+  EXPECT_LT((update.step + normal.inverse() * gradient).norm(), 1e-8);
+  EXPECT_LT((update.covariance - normal.inverse()).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+TEST(ScanUpdate, WithoutConstraintsReturnsToThePrior) {
+  std::mt19937 random(3);
+  const Matrix15d prior = random_covariance(random);
+  const UpdateStep update = information_update(prior, Vector15d::Zero(), {});
+  EXPECT_EQ(update.step.norm(), 0.0);
+  EXPECT_LT((update.covariance - prior).cwiseAbs().maxCoeff(), 1e-15);
+}
+
+TEST(ScanUpdate, ReportsValuesThatAreNotFinite) {
+  PoseInformation sum;
+  sum.add(Vector6d::Constant(std::nan("")), 0.0, 0.01);
+  EXPECT_FALSE(information_update(Matrix15d::Identity(), Vector15d::Zero(), sum).ok);
+}
+
+TEST(Degeneracy, FindsTheDirectionThatNoPlaneSees) {
+  // Planes facing X and Y only, at various lever arms: position along Z is free.
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> uniform(-5.0, 5.0);
+  Matrix6d sensitivity = Matrix6d::Zero();
+  constexpr int kPoints = 400;
+  for (int i = 0; i < kPoints; ++i) {
+    const Eigen::Vector3d normal = i % 2 == 0 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+    const double x = uniform(random);
+    const double y = uniform(random);
+    const double z = uniform(random);
+    Vector6d h;
+    h << Eigen::Vector3d(x, y, z).cross(normal), normal;
+    sensitivity += h * h.transpose() / kPoints;
+  }
+  const DegeneracyAnalysis analysis = analyse_degeneracy(sensitivity, 4.0, 0.004);
+  EXPECT_EQ(analysis.degenerate_directions, 1);
+  Vector6d along_z = Vector6d::Zero();
+  along_z[5] = 1.0;
+  EXPECT_LT((analysis.projector * along_z).norm(), 1e-9);
+  const Vector6d along_x = Vector6d::Unit(3);
+  EXPECT_LT((analysis.projector * along_x - along_x).norm(), 1e-6);
+}
+
+TEST(Degeneracy, ProjectedInformationLeavesThePriorAloneThere) {
+  PoseInformation sum;
+  for (int i = 0; i < 6; ++i) sum.add(Vector6d::Unit(i), 0.1, 0.01);
+  Matrix6d projector = Matrix6d::Identity();
+  projector(4, 4) = 0.0;
+  const Matrix15d prior = 0.04 * Matrix15d::Identity();
+  const UpdateStep update = information_update(prior, Vector15d::Zero(), sum.projected(projector));
+  EXPECT_DOUBLE_EQ(update.step[4], 0.0);
+  EXPECT_DOUBLE_EQ(update.covariance(4, 4), 0.04);
+  EXPECT_NEAR(update.step[3], -0.08, 1e-12);
+}
+
+}  // namespace
+}  // namespace ignis

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated drive through the real executables, over real LCM: bytes on a pty in, corrected map and pose out."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ignis import results
+from ignis.compare import comparison
+from ignis.pipeline import Pipeline, effective_config
+
+CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
+CONFIG = CHECKOUT / "config" / "ignis8.json"
+SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
+PORT = 18080
+# The back end starts this long after the others, so it must ask for the keyframes that it missed.
+LATE_SECONDS = 12.0
+
+
+class Drive:
+    """A finished drive and what it left behind."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.log = folder / "run.lcmlog"
+        self.page = b""
+        self.status: dict[str, Any] = {}
+        self.summary: dict[str, Any] = {}
+
+
+@pytest.fixture(scope="module")
+def drive(private_network, tmp_path_factory: pytest.TempPathFactory) -> Drive:
+    """Drives the quick scene once; the tests below look at different sides of it."""
+    result = Drive(tmp_path_factory.mktemp("drive"))
+    config = ("--config", CONFIG)
+    tty = result.folder / "l1.pty"
+    with Pipeline(result.folder, effective_config(CONFIG)["lcm"]["url"]) as pipeline:
+        pipeline.start("lcm-logger", "--quiet", result.log)
+        pipeline.start("map_builder", *config, "--port", PORT)
+        pipeline.start("lio_frontend", *config)
+        simulator = pipeline.start("l1_sim", "--scene", SCENE, *config, "--pty", tty, "--wait", 20)
+        pipeline.wait_for_text("l1_sim", "waiting", 10.0)
+        pipeline.start("l1_driver", *config, "--port", tty)
+        time.sleep(LATE_SECONDS)
+        pipeline.start("graph_backend", *config)
+        assert simulator.wait(180) == 0, pipeline.last_words("l1_sim")
+        time.sleep(3.0)
+        pipeline.check("l1_sim", "l1_driver")
+        result.page = _get("/")
+        result.status = json.loads(_get("/api/status"))
+        pipeline.stop("l1_driver", "lio_frontend", "graph_backend", "map_builder", "lcm-logger")
+    result.summary = results.write_results(result.log, result.folder)
+    return result
+
+
+def _get(path: str) -> bytes:
+    with urllib.request.urlopen(f"http://127.0.0.1:{PORT}{path}", timeout=5) as answer:
+        return answer.read()
+
+
+def test_no_receiver_loses_a_message(drive: Drive) -> None:
+    # The back end joins late, so its first message of a channel is not the sender's; that counts as no loss.
+    assert drive.summary["lost"] == 0, drive.summary["receivers"]
+    for channels in drive.summary["receivers"].values():
+        for counts in channels.values():
+            assert counts["rejected"] == 0 and counts["queue_drops"] == 0
+
+
+def test_scans_correct_the_state(drive: Drive) -> None:
+    assert drive.summary["scans"] > 1000
+    assert drive.summary["applied"] > 0.9 * drive.summary["scans"], drive.summary["rejected"]
+
+
+def test_pose_stays_near_the_truth(drive: Drive) -> None:
+    figures = comparison(drive.folder)["trajectories"]
+    assert figures["eskf"]["ate_rmse_m"] < 0.15
+    assert figures["smoothed"]["ate_rmse_m"] < 0.15
+
+
+def test_late_back_end_gets_every_keyframe_and_closes_a_loop(drive: Drive) -> None:
+    assert drive.summary["keyframes"] > 10
+    assert drive.summary["keyframes_in_graph"] == drive.summary["keyframes"]
+    assert drive.summary["loops"]["accepted"] >= 1
+
+
+def test_view_serves_the_page_and_the_three_levels(drive: Drive) -> None:
+    assert b"<html" in drive.page.lower()
+    assert all(count > 0 for count in drive.summary["voxels"].values()), drive.summary["voxels"]
+    assert drive.status
+
+
+def test_replay_of_the_recording_equals_the_live_run(drive: Drive, run_binary, tmp_path: Path) -> None:
+    reports = []
+    for name in ("first", "second"):
+        done = run_binary("lio_replay", drive.log, "--config", CONFIG, "--out", tmp_path / name, seconds=120)
+        assert done.returncode == 0, done.stderr
+        reports.append(json.loads((tmp_path / name / "report.json").read_text()))
+    assert reports[0]["trajectory_hash"] == reports[1]["trajectory_hash"]
+    assert reports[0]["map_hash"] == reports[1]["map_hash"]
+    for file in ("eskf.tum", "smoothed.tum", "keyframes.g2o", "map.pcd", "map.ply", "scan_stats.csv", "loops.csv"):
+        assert (tmp_path / "first" / file).read_bytes() == (tmp_path / "second" / file).read_bytes(), file
+    live = (drive.folder / "eskf.tum").read_text().splitlines()
+    replayed = (tmp_path / "first" / "eskf.tum").read_text().splitlines()
+    assert len(live) == len(replayed)
+    for row, other in zip(live, replayed, strict=True):
+        for a, b in zip(row.split(), other.split(), strict=True):
+            assert abs(float(a) - float(b)) < 1e-6, (row, other)
+
+
+def test_interrupted_demo_ends_every_process_and_keeps_what_it_computed(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    demo = subprocess.Popen(
+        [CHECKOUT / "ignis", "demo", "--quick", "--no-serve", "--out", folder],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not (folder / "logs" / "l1_driver.log").exists():
+        assert demo.poll() is None and time.monotonic() < deadline
+        time.sleep(0.2)
+    time.sleep(15.0)
+    os.killpg(demo.pid, signal.SIGINT)
+    output, _ = demo.communicate(timeout=60)
+    assert "Interrupted" in output
+    assert (folder / "run.lcmlog").stat().st_size > 100_000
+    assert (folder / "eskf.tum").exists()
+    left = subprocess.run(["pgrep", "-f", str(folder)], capture_output=True, text=True).stdout
+    assert not left, left
