@@ -26,17 +26,21 @@ Json state_json(const HudData& data) {
 
 Json scan_json(const HudData& data) {
   const scan_stats_t& scan = data.scan;
-  return {{"applied", scan.applied != 0},          {"reason", scan.reason_text},
-          {"points", scan.points},                 {"matched", scan.matched},
-          {"mean_innovation_m", scan.mean_innovation}, {"correction_m", scan.correction_m},
-          {"total_applied", data.scans_applied},   {"total_rejected", data.scans_rejected}};
+  return {{"applied", scan.applied != 0},
+          {"reason", scan.reason_text},
+          {"points", scan.points},
+          {"matched", scan.matched},
+          {"mean_innovation_m", scan.mean_innovation},
+          {"correction_m", scan.correction_m},
+          {"total_applied", data.scans_applied},
+          {"total_rejected", data.scans_rejected}};
 }
 
 Json loop_json(const HudData& data) {
   const loop_result_t& loop = data.loop;
-  return {{"keyframes", loop.keyframes},       {"candidates", loop.candidates},
-          {"accepted", loop.accepted != 0},    {"reason", loop.reason_text},
-          {"correction_m", loop.correction_m}, {"mean_residual_m", loop.mean_residual},
+  return {{"keyframes", loop.keyframes},           {"candidates", loop.candidates},
+          {"accepted", loop.accepted != 0},        {"reason", loop.reason_text},
+          {"correction_m", loop.correction_m},     {"mean_residual_m", loop.mean_residual},
           {"total_accepted", data.loops_accepted}, {"total_withdrawn", data.loops_withdrawn}};
 }
 

@@ -21,14 +21,14 @@ struct HudData {
   bool has_state = false;
   bool has_scan = false;
   bool has_loop = false;
-  double state_age_s = 0.0;          ///< [s] since the last LIO_STATE arrived
+  double state_age_s = 0.0;  ///< [s] since the last LIO_STATE arrived
   std::int64_t scans_applied = 0;
   std::int64_t scans_rejected = 0;
   int loops_accepted = 0;
   int loops_withdrawn = 0;
   bool rebuilding = false;
   std::int64_t messages_lost = 0;
-  std::string health;                ///< state_text of this process
+  std::string health;                  ///< state_text of this process
   std::array<double, 3> band_radii{};  ///< [m] windows of the levels
 };
 

@@ -63,11 +63,14 @@ tcp::acceptor open_listening_socket(net::io_context& context, const std::string&
   if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
   if (error == net::error::address_in_use) {
     throw UserError(std::format("port {} on {} is in use; stop the program that uses it, or choose another one with "
-                                "--port or hmi.port", port, address), runtime::kFailed);
+                                "--port or hmi.port",
+                                port, address),
+                    runtime::kFailed);
   }
   if (error) {
     throw UserError(std::format("cannot listen on {} port {}: {}; choose another with --port or hmi.address", address,
-                                port, error.message()), runtime::kFailed);
+                                port, error.message()),
+                    runtime::kFailed);
   }
   return acceptor;
 }

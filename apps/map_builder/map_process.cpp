@@ -28,7 +28,8 @@ MapProcess::MapProcess(const runtime::Application& application, const runtime::H
       link_(application),
       server_(hmi),
       map_(map_config_),
-      frame_period_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))) {
+      frame_period_(
+          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))) {
   hud_.map.address = server_.address();
   hud_.band_radii = {map_config_.local_window_m, map_config_.mid_window_m, map_config_.coarse_window_m};
   subscribe(application.config.lcm);

@@ -77,6 +77,8 @@ ViewServer::ViewServer(const runtime::HmiConfig& config)
 ViewServer::~ViewServer() {
   context_.stop();
   thread_.join();
+  // From here on only the coroutines hold viewers, and they go with the context: no socket may outlive it.
+  clients_.clear();
 }
 
 std::string ViewServer::address() const {
@@ -168,10 +170,9 @@ net::awaitable<void> ViewServer::serve_requests(beast::tcp_stream& stream) {
     http::response_serializer<http::string_body> serializer(response);
     stream.expires_after(kIdleTimeout);
     // A HEAD request gets the same header and no body.
-    const auto [write_error, written] =
-        !is_malformed && parser.get().method() == http::verb::head
-            ? co_await http::async_write_header(stream, serializer, kNoThrow)
-            : co_await http::async_write(stream, serializer, kNoThrow);
+    const auto [write_error, written] = !is_malformed && parser.get().method() == http::verb::head
+                                            ? co_await http::async_write_header(stream, serializer, kNoThrow)
+                                            : co_await http::async_write(stream, serializer, kNoThrow);
     if (write_error) co_return;
   }
   beast::error_code ignored;
@@ -216,9 +217,8 @@ net::awaitable<void> ViewServer::serve_viewer(beast::tcp_stream stream, Request 
   stream.expires_never();  // the WebSocket has its own timers
   ViewClient::Stream upgraded(std::move(stream));
   upgraded.set_option(websocket::stream_base::timeout{kRequestTimeout, kIdleTimeout, true});
-  upgraded.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
-    response.set(http::field::sec_websocket_protocol, kStreamProtocol);
-  }));
+  upgraded.set_option(websocket::stream_base::decorator(
+      [](websocket::response_type& response) { response.set(http::field::sec_websocket_protocol, kStreamProtocol); }));
   upgraded.read_message_max(kMaxInboundBytes);
   const auto client = std::make_shared<ViewClient>(std::move(upgraded), config_.max_view_radius_m, counters_, [this] {
     update_radii();

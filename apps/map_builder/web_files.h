@@ -8,7 +8,7 @@ namespace ignis {
 
 /// One file of the web client, as it was when the program was built.
 struct WebFile {
-  std::string_view path;          ///< of the request, such as "/view.js"
+  std::string_view path;  ///< of the request, such as "/view.js"
   std::string_view content_type;
   std::string_view content;
 };

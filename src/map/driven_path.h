@@ -11,9 +11,9 @@
 
 namespace ignis {
 
-/// The driven path twice: as odometry saw it, and as the corrected keyframes place it. Each point remembers the keyframe
-/// that it followed, so a correction moves the whole path without storing it twice.
-/// Bounded: when kMaxPoints is reached every other point goes and the spacing doubles.
+/// The driven path twice: as odometry saw it, and as the corrected keyframes place it. Each point remembers the
+/// keyframe that it followed, so a correction moves the whole path without storing it twice. Bounded: when kMaxPoints
+/// is reached every other point goes and the spacing doubles.
 class DrivenPath {
  public:
   static constexpr std::size_t kMaxPoints = 4000;

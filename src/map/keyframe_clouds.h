@@ -13,9 +13,9 @@
 
 namespace ignis {
 
-/// What a map is rebuilt from: for each keyframe the cloud that came with it and the live scans that followed it, all in
-/// the keyframe's body frame, one point per cell of the local level. A correction of the keyframe's pose thus carries
-/// everything that was seen from there, and a rebuild loses no detail.
+/// What a map is rebuilt from: for each keyframe the cloud that came with it and the live scans that followed it, all
+/// in the keyframe's body frame, one point per cell of the local level. A correction of the keyframe's pose thus
+/// carries everything that was seen from there, and a rebuild loses no detail.
 ///
 /// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped.
 class KeyframeClouds {

@@ -31,8 +31,9 @@ struct RebuildJob {
 /// Builds the map of a job: the same voxels on any thread and after any history.
 [[nodiscard]] ThreeLevelMap rebuild(const RebuildJob& job);
 
-/// The voxel map of a drive: live scans enter it where odometry and the current correction place them; when the back end
-/// has moved the keyframes, it is rebuilt from their clouds. Frames: `odom` of the front end, `map` of the back end.
+/// The voxel map of a drive: live scans enter it where odometry and the current correction place them; when the back
+/// end has moved the keyframes, it is rebuilt from their clouds. Frames: `odom` of the front end, `map` of the back
+/// end.
 ///
 /// A rebuild is begun (begin_rebuild), run anywhere (rebuild) and taken over (finish_rebuild). Meanwhile the old map
 /// stays in use; scans and keyframes that arrive between are added to the new one. Not thread-safe, no clocks.

@@ -72,6 +72,14 @@ void write_checked(const std::filesystem::path& file, Write&& write) {
   output.commit();
 }
 
+/// PCL refuses to write a PLY file without points.
+void write_empty_ply(const std::filesystem::path& file) {
+  FileOutput output(file);
+  output.stream() << "ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+                     "property float z\nproperty float intensity\nproperty uchar level\nend_header\n";
+  output.commit();
+}
+
 }  // namespace
 
 void write_pcd(const std::filesystem::path& file, const ThreeLevelMap& map) {
@@ -83,6 +91,10 @@ void write_pcd(const std::filesystem::path& file, const ThreeLevelMap& map) {
 
 void write_ply(const std::filesystem::path& file, const ThreeLevelMap& map) {
   const pcl::PCLPointCloud2 cloud = to_cloud(map);
+  if (cloud.width == 0) {
+    write_empty_ply(file);
+    return;
+  }
   write_checked(file, [&](const std::string& name) {
     return pcl::PLYWriter().writeBinary(name, cloud, Eigen::Vector4f::Zero(), Eigen::Quaternionf::Identity(), false);
   });

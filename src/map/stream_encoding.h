@@ -28,8 +28,8 @@ struct StreamFrame {
   std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> loop_edges;
 };
 
-/// Encodes a frame as docs/wire_format.md lays it out: little-endian, every item on a 4-byte boundary. Voxels whose cell
-/// does not fit 16 bits relative to the level's origin are left out; MapConfig's rules make that impossible.
+/// Encodes a frame as docs/wire_format.md lays it out: little-endian, every item on a 4-byte boundary. Voxels whose
+/// cell does not fit 16 bits relative to the level's origin are left out; MapConfig's rules make that impossible.
 [[nodiscard]] std::string encode_frame(const StreamFrame& frame);
 
 }  // namespace ignis

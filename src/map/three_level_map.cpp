@@ -151,8 +151,8 @@ MapView ThreeLevelMap::view(double radius_m) const {
       const bool first = shown.voxels.empty();
       shown.min_height = first ? point.p_world.y() : std::min(shown.min_height, point.p_world.y());
       shown.max_height = first ? point.p_world.y() : std::max(shown.max_height, point.p_world.y());
-      shown.voxels.push_back({cell, static_cast<std::uint8_t>(std::clamp(point.intensity, 0.0F, 255.0F)),
-                              point.keyframe_id == kLive});
+      shown.voxels.push_back(
+          {cell, static_cast<std::uint8_t>(std::clamp(point.intensity, 0.0F, 255.0F)), point.keyframe_id == kLive});
       if (i + 1 < kLevels) covered_next.insert(parent_cell(cell, ratio));
     });
     covered = std::move(covered_next);

@@ -80,8 +80,6 @@ std::vector<std::pair<CellIndex, MapPoint>> VoxelLevel::sorted() const {
   return voxels;
 }
 
-std::size_t VoxelLevel::bytes() const {
-  return voxels_.bucket_count() * (sizeof(decltype(voxels_)::value_type) + 1);
-}
+std::size_t VoxelLevel::bytes() const { return voxels_.bucket_count() * (sizeof(decltype(voxels_)::value_type) + 1); }
 
 }  // namespace ignis

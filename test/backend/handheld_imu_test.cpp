@@ -56,7 +56,6 @@ class HandheldImu : public ::testing::Test {
     ASSERT_GT(poses_.size(), 2000U);
   }
 
-  /// Begins a sample earlier, so that the start lies in a held sample, like everything that follows.
   [[nodiscard]] std::vector<ImuSample> between(Utime start, Utime end) const {
     std::vector<ImuSample> inside;
     for (const ImuSample& sample : samples_) {

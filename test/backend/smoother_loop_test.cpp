@@ -127,28 +127,28 @@ TEST(SmootherLoops, KeepATrueOneFoundElsewhere) {
 }
 
 TEST(SmootherLoops, WithdrawAnEarlierOneOnceOthersContradictIt) {
-  const testing::Drive drive = testing::make_drive({.seed = 8, .keyframes = 42});
+  const testing::Drive drive = testing::make_drive({.seed = 8, .keyframes = 24});
   Smoother smoother = run(drive, without_loops());
-  // A lie that the drift of a lap could explain, told with more certainty than it deserves.
+  // A lie that the drift of a lap could explain.
   Vector6d lie = Vector6d::Zero();
   lie(3) = 0.25;
-  const auto estimate = poses_of(smoother);
-  const Pose T_false = perturbed_in_body(estimate[1].inverse() * estimate[22], lie);
-  const SmootherUpdate trial = smoother.add_loop({22, 1, T_false, information(0.02, 0.01)});
+  const Pose T_true = drive.T_world_body[1].inverse() * drive.T_world_body[22];
+  const SmootherUpdate trial = smoother.add_loop({22, 1, perturbed_in_body(T_true, lie), information(0.02, 0.02)});
   ASSERT_TRUE(trial.loop->accepted()) << trial.loop->reason_text;
+  // Each of the others alone is too vague to say anything against it.
   std::vector<LoopResult> withdrawn;
-  for (std::size_t from = 16; from < 42 && withdrawn.empty(); ++from) {
-    for (const std::size_t to : {std::size_t{0}, from - 15}) {
-      const Pose T_true = drive.T_world_body[to].inverse() * drive.T_world_body[from];
-      const SmootherUpdate update = smoother.add_loop(
-          {static_cast<std::int32_t>(from), static_cast<std::int32_t>(to), T_true, information(0.02, 0.1)});
-      withdrawn.insert(withdrawn.end(), update.withdrawn.begin(), update.withdrawn.end());
-    }
+  for (int i = 0; i < 40 && withdrawn.empty(); ++i) {
+    const SmootherUpdate update = smoother.add_loop({22, 1, T_true, information(0.02, 0.1)});
+    EXPECT_TRUE(update.loop->accepted()) << update.loop->reason_text;
+    withdrawn = update.withdrawn;
+    EXPECT_TRUE(withdrawn.empty() || i > 3);
   }
   ASSERT_EQ(withdrawn.size(), 1U);
-  EXPECT_EQ(withdrawn[0].from_id, 22);
-  EXPECT_EQ(withdrawn[0].to_id, 1);
   EXPECT_EQ(withdrawn[0].reason, LoopReason::kWithdrawn);
+  EXPECT_LT(body_difference(T_true, withdrawn[0].T_to_from).tail<3>().norm(), 0.26);
+  EXPECT_GT(body_difference(T_true, withdrawn[0].T_to_from).tail<3>().norm(), 0.24);
+  const auto poses = poses_of(smoother);
+  EXPECT_LT(body_difference(T_true, poses[1].inverse() * poses[22]).tail<3>().norm(), 0.05);
 }
 
 TEST(SmootherLoops, RefuseWhatTheGraphDoesNotHoldOrIsNotFinite) {

@@ -11,6 +11,7 @@ import struct
 import subprocess
 
 import pytest
+
 from ignis.pipeline import binary
 
 PROTOCOL = "ignis.lio_map.v1"
@@ -44,7 +45,12 @@ class Server:
         return socket.create_connection(("127.0.0.1", self.port), timeout=10)
 
     def request(self, target, *headers, method="GET", host=None):
-        lines = [f"{method} {target} HTTP/1.1", f"Host: {host or f'127.0.0.1:{self.port}'}", "Connection: close", *headers]
+        lines = [
+            f"{method} {target} HTTP/1.1",
+            f"Host: {host or f'127.0.0.1:{self.port}'}",
+            "Connection: close",
+            *headers,
+        ]
         return self.raw("\r\n".join(lines).encode("latin-1") + b"\r\n\r\n")
 
     def raw(self, data):
@@ -61,9 +67,15 @@ class Server:
 
     def upgrade(self, *extra, origin=None, protocol=PROTOCOL, target="/ws/lio_map", host=None):
         connection = self.connect()
-        lines = [f"GET {target} HTTP/1.1", f"Host: {host or f'127.0.0.1:{self.port}'}", "Upgrade: websocket",
-                 "Connection: Upgrade", "Sec-WebSocket-Version: 13",
-                 "Sec-WebSocket-Key: " + base64.b64encode(b"0123456789abcdef").decode(), *extra]
+        lines = [
+            f"GET {target} HTTP/1.1",
+            f"Host: {host or f'127.0.0.1:{self.port}'}",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            "Sec-WebSocket-Version: 13",
+            "Sec-WebSocket-Key: " + base64.b64encode(b"0123456789abcdef").decode(),
+            *extra,
+        ]
         if protocol:
             lines.append(f"Sec-WebSocket-Protocol: {protocol}")
         if origin:

@@ -78,9 +78,16 @@ TEST_F(MapExport, EqualMapsGiveEqualFiles) {
   EXPECT_EQ(content(folder_ / "a.pcd"), content(folder_ / "b.pcd"));
 }
 
-TEST_F(MapExport, AnEmptyMapGivesAReadableFile) {
-  write_pcd(folder_ / "empty.pcd", ThreeLevelMap(MapConfig{}));
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "empty.pcd"));
+TEST_F(MapExport, AnEmptyMapGivesFilesWithoutPoints) {
+  const ThreeLevelMap empty(MapConfig{});
+  write_pcd(folder_ / "empty.pcd", empty);
+  write_ply(folder_ / "empty.ply", empty);
+  pcl::PCLPointCloud2 cloud;
+  EXPECT_EQ(pcl::io::loadPCDFile((folder_ / "empty.pcd").string(), cloud), 0);
+  EXPECT_EQ(cloud.width * cloud.height, 0U);
+  std::ifstream ply(folder_ / "empty.ply");
+  const std::string text(std::istreambuf_iterator<char>(ply), {});
+  EXPECT_TRUE(text.starts_with("ply\nformat binary_little_endian 1.0\nelement vertex 0\n"));
 }
 
 TEST_F(MapExport, NamesTheFileThatCannotBeWrittenAndLeavesNothingBehind) {

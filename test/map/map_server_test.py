@@ -11,6 +11,7 @@ import subprocess
 import time
 
 import pytest
+
 from ignis.pipeline import binary
 
 PROTOCOL = "ignis.lio_map.v1"
@@ -40,9 +41,22 @@ def test_status_is_json(server):
     assert json.loads(body)["voxels"] == [0, 0, 0]
 
 
-@pytest.mark.parametrize("target", [
-    "/../../etc/passwd", "/..%2f..%2fetc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/%c0%ae%c0%ae/etc/passwd", "//etc/passwd",
-    "/etc/passwd", "/web/view.js", "/index.html/..", "/view.js%00.css", "/VIEW.JS", "/map_builder"])
+@pytest.mark.parametrize(
+    "target",
+    [
+        "/../../etc/passwd",
+        "/..%2f..%2fetc/passwd",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "/%c0%ae%c0%ae/etc/passwd",
+        "//etc/passwd",
+        "/etc/passwd",
+        "/web/view.js",
+        "/index.html/..",
+        "/view.js%00.css",
+        "/VIEW.JS",
+        "/map_builder",
+    ],
+)
 def test_paths_outside_the_table_are_404(server, target):
     status, _, body = server.request(target)
     assert status in (400, 404) and b"root:" not in body
@@ -50,9 +64,14 @@ def test_paths_outside_the_table_are_404(server, target):
 
 def test_malformed_requests_get_4xx_and_no_crash(server):
     host = b"Host: 127.0.0.1\r\n"
-    for data in (b"NONSENSE\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"GET / HTTP/1.1\r\n" + host + b"X: " + b"a" * 20000 + b"\r\n\r\n",
-                 b"GET / HTTP/1.1\r\n" + host + b"Content-Length: 1\r\nContent-Length: 2\r\n\r\nab",
-                 b"POST / HTTP/1.1\r\n" + host + b"Content-Length: 5\r\n\r\nhello", b"GET /\x00 HTTP/1.1\r\n" + host + b"\r\n"):
+    for data in (
+        b"NONSENSE\r\n\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + host + b"X: " + b"a" * 20000 + b"\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + host + b"Content-Length: 1\r\nContent-Length: 2\r\n\r\nab",
+        b"POST / HTTP/1.1\r\n" + host + b"Content-Length: 5\r\n\r\nhello",
+        b"GET /\x00 HTTP/1.1\r\n" + host + b"\r\n",
+    ):
         assert 400 <= server.raw(data)[0] < 500, data[:40]
     for method in ("POST", "DELETE", "OPTIONS"):
         assert server.request("/", method=method)[0] == 405
@@ -178,8 +197,13 @@ def test_inherited_socket_works(start_server):
 
 
 def run_to_end(*arguments, **environment):
-    return subprocess.run([binary("map_builder"), "--lcm-url", "memq://", *arguments], capture_output=True, text=True, timeout=20,
-                          env={**os.environ, **environment})
+    return subprocess.run(
+        [binary("map_builder"), "--lcm-url", "memq://", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=20,
+        env={**os.environ, **environment},
+    )
 
 
 def test_occupied_port_is_one_sentence_and_a_failure():

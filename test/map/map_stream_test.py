@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A synthetic drive over the real bus into map_builder, seen through the WebSocket."""
 
+import json
 import math
 import struct
 import threading
@@ -98,7 +99,8 @@ class Drive:
     def publish_correction(self, revision):
         """Puts every keyframe back on the line x = 0."""
         graph = types.smoothed_keyframes_t()
-        graph.utime, graph.sequence, graph.revision, graph.part_count, graph.full = self.stamp(), revision, revision, 1, 1
+        graph.utime, graph.sequence, graph.revision = self.stamp(), revision, revision
+        graph.part_count, graph.full = 1, 1
         graph.graph_keyframes = graph.num_keyframes = len(self.keyframes)
         graph.newest_id = len(self.keyframes) - 1
         graph.map_odom_position = [-self.keyframes[-1][0], 0.0, 0.0]
@@ -118,8 +120,9 @@ def decode(frame):
     for k in range(3):
         cell, count = struct.unpack_from("<fI", frame, 28 + 16 * k)
         origin = np.array(struct.unpack_from("<3i", frame, at))
-        records = np.frombuffer(frame, dtype=[("cell", "<i2", 3), ("intensity", "u1"), ("flags", "u1")], count=count,
-                                offset=at + 12)
+        records = np.frombuffer(
+            frame, dtype=[("cell", "<i2", 3), ("intensity", "u1"), ("flags", "u1")], count=count, offset=at + 12
+        )
         levels.append((cell * (records["cell"] + origin + 0.5), records["flags"]))
         at += 12 + 8 * count
     parts = []
@@ -142,8 +145,6 @@ class Viewer(threading.Thread):
         self.start()
 
     def run(self):
-        import json
-
         try:
             while True:
                 opcode, payload = self.socket.receive()

@@ -139,7 +139,8 @@ TEST(StreamEncoding, EncodingADecodedFrameGivesTheSameBytes) {
 TEST(StreamEncoding, LeavesOutCellsThatSixteenBitsCannotHoldAndCountsTheRest) {
   StreamFrame frame;
   frame.levels[1].origin = {100, 0, 0};
-  frame.levels[1].voxels = {{{100 + 32'767, 0, 0}, 1, true}, {{100 + 32'768, 0, 0}, 2, true}, {{0, -32'768, 0}, 3, true}};
+  frame.levels[1].voxels = {
+      {{100 + 32'767, 0, 0}, 1, true}, {{100 + 32'768, 0, 0}, 2, true}, {{0, -32'768, 0}, 3, true}};
   const StreamFrame decoded = decode(encode_frame(frame));
   ASSERT_EQ(decoded.levels[1].voxels.size(), 2U);
   EXPECT_EQ(decoded.levels[1].voxels[0].cell.x, 100 + 32'767);

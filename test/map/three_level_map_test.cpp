@@ -14,7 +14,9 @@ namespace {
 using test::pose_at;
 using test::random_cloud;
 
-double horizontal(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return std::hypot(a.x() - b.x(), a.z() - b.z()); }
+double horizontal(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::hypot(a.x() - b.x(), a.z() - b.z());
+}
 
 TEST(ThreeLevelMap, PutsAScanWithinTheLocalWindowIntoTheLocalLevelAlone) {
   std::mt19937 generator(1);

@@ -21,8 +21,9 @@ TEST(ViewRequest, RefusesEverythingElse) {
   for (const std::string& text :
        {std::string(), std::string("25"), std::string("{}"), std::string(R"({"view": "25"})"),
         std::string(R"({"view": null})"), std::string(R"({"view": NaN})"), std::string(R"({"view": 1e999})"),
-        std::string(R"({"view": 1, "x": 2})"), std::string(R"({"view": 1, "view": 2})"), std::string(R"({"view": true})"),
-        std::string(R"({"view": 25)"), std::string("{\"view\": \xff}"), deep, std::string(100'000, ' ')}) {
+        std::string(R"({"view": 1, "x": 2})"), std::string(R"({"view": 1, "view": 2})"),
+        std::string(R"({"view": true})"), std::string(R"({"view": 25)"), std::string("{\"view\": \xff}"), deep,
+        std::string(100'000, ' ')}) {
     const auto parsed = parse_view_request(text, kMax);
     EXPECT_FALSE(parsed.has_value()) << text.substr(0, 60);
     if (!parsed) {

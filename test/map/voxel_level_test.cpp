@@ -18,7 +18,8 @@ std::vector<MapPoint> random_points(std::uint32_t seed, std::size_t count, doubl
   std::vector<MapPoint> points;
   for (std::size_t i = 0; i < count; ++i) {
     points.push_back({{coordinate(generator), coordinate(generator), coordinate(generator)},
-                      static_cast<float>(i % 256), static_cast<std::int32_t>(i)});
+                      static_cast<float>(i % 256),
+                      static_cast<std::int32_t>(i)});
   }
   return points;
 }
