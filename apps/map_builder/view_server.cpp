@@ -44,7 +44,7 @@ http::response<http::string_body> make_response(http::status status, std::string
   response.set(http::field::content_type, type);
   response.set(http::field::cache_control, "no-cache");
   response.set("X-Content-Type-Options", "nosniff");
-  response.set("Content-Security-Policy", "default-src 'self'; frame-ancestors 'none'");
+  response.set("Content-Security-Policy", "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'");
   response.body() = body;
   response.prepare_payload();
   return response;
@@ -220,6 +220,7 @@ net::awaitable<void> ViewServer::serve_viewer(beast::tcp_stream stream, Request 
   upgraded.set_option(websocket::stream_base::decorator(
       [](websocket::response_type& response) { response.set(http::field::sec_websocket_protocol, kStreamProtocol); }));
   upgraded.read_message_max(kMaxInboundBytes);
+  upgraded.auto_fragment(false);  // control frames can wait for one map frame; 4 kB pieces would cost a call each
   const auto client = std::make_shared<ViewClient>(std::move(upgraded), config_.max_view_radius_m, counters_, [this] {
     update_radii();
     view_changed_ = true;

@@ -39,7 +39,6 @@ struct FrontendConfig {
   double keyframe_dist_m = 4.0;
   double keyframe_yaw_rad = 0.6;
   bool use_scan_matching = true;
-  bool use_loop_closing = true;
 
   std::string start = "at_rest";
   double start_seconds = 1.5;
@@ -53,11 +52,11 @@ struct FrontendConfig {
   double moving_velocity_sigma = 15.0;
   double moving_accel_sigma = 1.0;
   double velocity_known_sigma = 0.5;
-  double full_observability = 0.01;
+  double full_observability = 1e-4;
   bool adapt_measurement_noise = true;
   double noise_prior_points = 20.0;
   double residual_inflation = 4.0;
-  double degeneracy_threshold = 0.002;
+  double degeneracy_threshold = 1e-5;
   int min_scan_points = 50;
   int min_matches = 20;
   int max_scan_points = 3000;
@@ -109,7 +108,6 @@ struct FrontendConfig {
     visit.number("keyframe_yaw_rad", self.keyframe_yaw_rad, {0.05, 3.14159265358979}, "rad",
                  "turn that makes a keyframe");
     visit.flag("use_scan_matching", self.use_scan_matching, "off: pure inertial integration");
-    visit.flag("use_loop_closing", self.use_loop_closing, "off: the back end adds no loops");
   }
 
   static void visit_reference_gates(auto& self, auto& visit) {

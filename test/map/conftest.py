@@ -116,14 +116,23 @@ class WebSocket:
             data += part
         return data
 
-    def receive(self):
+    def receive_one(self):
         first, second = self.exactly(2)
         length = second & 127
         if length == 126:
             length = struct.unpack(">H", self.exactly(2))[0]
         elif length == 127:
             length = struct.unpack(">Q", self.exactly(8))[0]
+        assert first & 0x80, "the server sends whole frames"
         return first & 15, self.exactly(length)
+
+    def receive(self):
+        """The next frame; pings are answered on the way, or the server would take us for dead."""
+        while True:
+            opcode, payload = self.receive_one()
+            if opcode != 9:
+                return opcode, payload
+            self.send(payload, opcode=10)
 
     def until(self, wanted):
         while True:

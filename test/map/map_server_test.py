@@ -167,6 +167,19 @@ def test_a_client_that_vanishes_or_never_finishes_its_handshake_harms_nobody(ser
     assert server.request("/")[0] == 200
 
 
+def test_a_client_that_answers_no_ping_is_closed_and_one_that_does_stays(server):
+    (_, silent), (_, lively) = server.upgrade(), server.upgrade()
+    silent.connection.settimeout(15)
+    began = time.monotonic()
+    with pytest.raises(ConnectionError):
+        while time.monotonic() < began + 15:
+            silent.receive_one()
+            lively.receive()
+    assert 8 < time.monotonic() - began < 14
+    assert lively.text("hud")
+    lively.close()
+
+
 def test_client_cap_gives_503_and_a_place_becomes_free(start_server, tmp_path):
     config = tmp_path / "config.json"
     config.write_text('{"hmi": {"max_clients": 2}}')

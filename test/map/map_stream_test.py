@@ -181,6 +181,7 @@ def running(private_network, start_server):
 
 def test_a_drive_shows_walls_where_they_are_on_all_three_levels(running):
     viewer, drive = Viewer(running), Drive()
+    viewer.socket.send(b'{"view": 60}')
     drive_for(drive, 24)
     viewer.wait_for(lambda hud: hud["map"]["clouds_inserted"] == drive.step)
     time.sleep(0.5)
@@ -193,7 +194,8 @@ def test_a_drive_shows_walls_where_they_are_on_all_three_levels(running):
         assert (flags == 1).all()
     distance = [np.hypot(*(points[:, [0, 2]] - pose[[0, 2]]).T) for points, _ in levels]
     assert distance[0].max() < 10.7
-    assert distance[1].max() < 25.5
+    assert 10 < distance[1].max() < 30.7
+    assert 30 < distance[2].max() < 60.7
     assert len(odometry) == len(smoothed) > 100
     assert len(edges) == 0
     assert viewer.hud["state"]["yaw_deg"] == pytest.approx(math.degrees(0.25))
@@ -217,8 +219,8 @@ def test_a_loop_rebuilds_the_map_at_the_corrected_poses_and_the_stream_goes_on(r
     assert viewer.hud["map"]["revision"] == 1
     assert len(edges) == 1
     assert np.abs(odometry[:, 0]).max() > 0.9
-    # Each point goes with its keyframe, so up to 2 m of drift within a keyframe's stretch are left.
-    assert np.abs(smoothed[:, 0]).max() < 0.25
+    # What is left: drift within a keyframe's stretch, and that of the 2 s since the correction.
+    assert np.abs(smoothed[:, 0]).max() < 0.35
     walls = levels[1][0][np.abs(levels[1][0][:, 1] - 0.7) < 0.6]
     before = drifted[1][1][0][np.abs(drifted[1][1][0][:, 1] - 0.7) < 0.6]
     spread = [np.abs(np.abs(points[:, 0]) - WALL_X).max() for points in (before, walls)]

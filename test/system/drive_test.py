@@ -17,7 +17,7 @@ from ignis.compare import comparison
 from ignis.pipeline import Pipeline, effective_config
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
-CONFIG = CHECKOUT / "config" / "ignis8.json"
+CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
 SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
 PORT = 18080
 # The back end starts this long after the others, so it must ask for the keyframes that it missed.
