@@ -94,7 +94,8 @@ void FrontendNode::publish_keyframe(const Keyframe& keyframe) {
 
 void FrontendNode::on_request(const keyframe_request_t& request) {
   for (const Keyframe& keyframe : sent_keyframes_) {
-    if (keyframe.session != request.session || std::ranges::find(request.ids, keyframe.id) == request.ids.end()) continue;
+    if (keyframe.session != request.session || std::ranges::find(request.ids, keyframe.id) == request.ids.end())
+      continue;
     for (const keyframe_t& part : messages::to_messages(keyframe)) link_.publish(channels::kKeyframe, part);
   }
 }
@@ -104,7 +105,8 @@ void FrontendNode::publish_health() {
   if (!status.running) {
     link_.report_health(newest_utime_, health_t::DEGRADED, status.text, lio_.session());
   } else if (scans_since_applied_ >= kLostAfterScans) {
-    link_.report_health(newest_utime_, health_t::LOST, std::format("no scan applied: {}", last_reason_), lio_.session());
+    link_.report_health(newest_utime_, health_t::LOST, std::format("no scan applied: {}", last_reason_),
+                        lio_.session());
   } else if (scans_since_applied_ >= kDegradedAfterScans) {
     link_.report_health(newest_utime_, health_t::DEGRADED, std::format("no scan applied: {}", last_reason_),
                         lio_.session());

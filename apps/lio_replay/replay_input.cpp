@@ -50,8 +50,7 @@ void ReplayInput::index(const messages::LogEvent& event) {
   }
   imu_t imu;
   scan_t scan;
-  const bool decoded =
-      is_scan ? messages::decode_checked(event.data, scan) : messages::decode_checked(event.data, imu);
+  const bool decoded = is_scan ? messages::decode_checked(event.data, scan) : messages::decode_checked(event.data, imu);
   if (!decoded) {
     ++inventory_.undecodable;
     return;
@@ -67,8 +66,7 @@ void ReplayInput::index_ground_truth(const messages::LogEvent& event) {
     return;
   }
   ++inventory_.used[channels::kGroundTruth];
-  ground_truth_.push_back(
-      {message.utime, {messages::load(message.quaternion), messages::load(message.position)}});
+  ground_truth_.push_back({message.utime, {messages::load(message.quaternion), messages::load(message.position)}});
 }
 
 void ReplayInput::count_missing() {

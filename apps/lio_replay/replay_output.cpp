@@ -33,11 +33,11 @@ void write_scan_stats(const std::filesystem::path& file, const ReplayResult& res
                      "correction_m,correction_rad,velocity_correction_m_s,observability_x,observability_y,"
                      "observability_z,degenerate_directions,map_points\n";
   for (const ScanStats& s : result.scans) {
-    output.stream() << std::format("{},{},{},\"{}\",{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{},{}\n",
-                                   s.utime, s.scan_sequence, s.applied() ? 1 : 0, text(s.reason), s.points, s.matched,
-                                   s.used, s.mean_innovation, s.mean_residual, s.correction_m, s.correction_rad,
-                                   s.velocity_correction, s.observability.x(), s.observability.y(),
-                                   s.observability.z(), s.degenerate_directions, s.map_points);
+    output.stream() << std::format(
+        "{},{},{},\"{}\",{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{},{}\n", s.utime,
+        s.scan_sequence, s.applied() ? 1 : 0, text(s.reason), s.points, s.matched, s.used, s.mean_innovation,
+        s.mean_residual, s.correction_m, s.correction_rad, s.velocity_correction, s.observability.x(),
+        s.observability.y(), s.observability.z(), s.degenerate_directions, s.map_points);
   }
   output.commit();
 }
@@ -48,9 +48,8 @@ void write_loops(const std::filesystem::path& file, const ReplayResult& result) 
                      "mean_residual_m,matched_fraction\n";
   for (const LoopResult& loop : result.loops) {
     output.stream() << std::format("{},{},{},{},\"{}\",{},{},{:.6f},{:.6f},{:.6f},{:.4f}\n", loop.utime, loop.from_id,
-                                   loop.to_id, loop.accepted() ? 1 : 0, text(loop.reason), loop.candidates,
-                                   loop.passed, loop.correction_m, loop.correction_rad, loop.mean_residual,
-                                   loop.matched_fraction);
+                                   loop.to_id, loop.accepted() ? 1 : 0, text(loop.reason), loop.candidates, loop.passed,
+                                   loop.correction_m, loop.correction_rad, loop.mean_residual, loop.matched_fraction);
   }
   output.commit();
 }
@@ -175,17 +174,18 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const r
 std::string summary(const ReplayInput& input, const ReplayResult& result, const ReplayTiming& timing) {
   const double seconds = drive_seconds(input);
   std::string text = std::format("start:      {}\n", result.start);
-  text += std::format("drive:      {:.1f} s, {} IMU samples, {} scans\n", seconds, result.imu_samples,
-                      result.scans.size());
+  text +=
+      std::format("drive:      {:.1f} s, {} IMU samples, {} scans\n", seconds, result.imu_samples, result.scans.size());
   text += std::format("scans:      {} applied", applied_scans(result));
   for (const auto& [reason, count] : scans_by_reason(result)) {
     if (reason != ignis::text(ScanReason::kApplied)) text += std::format(", {} {}", count, reason);
   }
   text += std::format("\ngraph:      {} keyframes, {} loops kept, {} withdrawn\n", result.smoother.keyframes,
                       result.smoother.loops_kept, result.smoother.loops_withdrawn);
-  text += std::format("time:       {:.2f} s, {:.1f} times real time; a scan takes {:.2f} ms (median), {:.2f} ms (p99)\n",
-                      timing.wall_s, seconds / std::max(timing.wall_s, 1e-9), quantile(result.scan_times_ms, 0.5),
-                      quantile(result.scan_times_ms, 0.99));
+  text +=
+      std::format("time:       {:.2f} s, {:.1f} times real time; a scan takes {:.2f} ms (median), {:.2f} ms (p99)\n",
+                  timing.wall_s, seconds / std::max(timing.wall_s, 1e-9), quantile(result.scan_times_ms, 0.5),
+                  quantile(result.scan_times_ms, 0.99));
   text += std::format("trajectory: {}\n", trajectory_hash(result));
   const LogInventory& inventory = input.inventory();
   if (inventory.missing_imu + inventory.missing_scans > 0) {

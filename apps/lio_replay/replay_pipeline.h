@@ -21,11 +21,11 @@ struct ReplayResult {
   std::vector<ScanStats> scans;
   std::vector<double> scan_times_ms;  ///< wall time of each scan in the front end
   std::vector<LoopResult> loops;
-  Trajectory odometry;                ///< one row per scan, frame odom
-  Trajectory smoothed;                ///< on the same stamps, frame map
+  Trajectory odometry;  ///< one row per scan, frame odom
+  Trajectory smoothed;  ///< on the same stamps, frame map
   PoseGraph graph;
   SmootherStats smoother;
-  std::string start;                  ///< what the front end says about its start
+  std::string start;  ///< what the front end says about its start
   std::int64_t imu_samples = 0;
   std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
 };

@@ -42,8 +42,8 @@ class LcmLink {
 
   /// Calls `handler` with each well-formed message. The counts stay valid as long as the link.
   template <class Message>
-  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity,
-                            std::function<void(const Message&)> handler, Senders senders = Senders::kOne) {
+  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity, std::function<void(const Message&)> handler,
+                            Senders senders = Senders::kOne) {
     Receiver& receiver = receivers_.emplace_back();
     receiver.counts.channel = channel;
     receiver.deliver = [&receiver, handler = std::move(handler), senders](std::span<const std::byte> data) {
@@ -63,8 +63,8 @@ class LcmLink {
   /// Waits at most `timeout_ms` for one message and handles it. True when one was handled.
   bool handle(int timeout_ms);
 
-  /// Publishes HEALTH when a second has passed or `state` changed. `utime`: newest measurement seen [us]. `state`: one of
-  /// health_t's constants.
+  /// Publishes HEALTH when a second has passed or `state` changed. `utime`: newest measurement seen [us]. `state`: one
+  /// of health_t's constants.
   void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
 
   [[nodiscard]] std::int64_t failed_sends() const { return failed_sends_; }

@@ -42,10 +42,14 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="./ignis demo", description="A simulated drive through every process.")
     parser.add_argument("--quick", action="store_true", help="a drive of about one minute instead of more than three")
     parser.add_argument("--scene", type=Path, help="another scene file")
-    parser.add_argument("--config", type=Path, default=checkout / "config" / "ignis8_tuned.json", help="configuration file")
+    parser.add_argument(
+        "--config", type=Path, default=checkout / "config" / "ignis8_tuned.json", help="configuration file"
+    )
     parser.add_argument("--seed", type=int, default=1, help="seed of all noise")
     parser.add_argument("--out", type=Path, help="results folder (default: results/demo-DATE-TIME)")
-    parser.add_argument("--port", type=int, help="TCP port of the browser view (default: hmi.port, or the next free one)")
+    parser.add_argument(
+        "--port", type=int, help="TCP port of the browser view (default: hmi.port, or the next free one)"
+    )
     parser.add_argument("--no-serve", action="store_true", help="end after the table instead of serving the view")
     options = parser.parse_args(arguments)
     options.scene = options.scene or checkout / "config" / "scenes" / f"{SCENES[options.quick]}.json"

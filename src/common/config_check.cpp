@@ -4,8 +4,8 @@
 namespace ignis::config {
 
 std::string describe(const Offences& offences) {
-  std::string text = std::format("{} in the configuration:", offences.size() == 1 ? "one fault"
-                                                                                 : std::format("{} faults", offences.size()));
+  std::string text = std::format("{} in the configuration:",
+                                 offences.size() == 1 ? "one fault" : std::format("{} faults", offences.size()));
   for (const Offence& offence : offences) {
     text += std::format("\n  {} = {}: allowed is {}", offence.field, offence.value, offence.allowed);
   }

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-/// One definition per parameter. A configuration struct keeps its defaults in its members and lists the members once, in
-/// `void visit_fields(this auto& self, auto& visit)`. Visitors turn that list into a strict loader, a validator, a
+/// One definition per parameter. A configuration struct keeps its defaults in its members and lists the members once,
+/// in `void visit_fields(this auto& self, auto& visit)`. Visitors turn that list into a strict loader, a validator, a
 /// printer and a JSON schema (config_check.h, config_json.h), so the four can never disagree.
 ///
 /// A visitor offers

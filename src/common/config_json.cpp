@@ -79,8 +79,8 @@ void Loader::refuse_unknown_keys() {
     // "$schema" is how editors find the schema; it configures nothing.
     if (known_.contains(key) || (path_.empty() && key == "$schema")) continue;
     const std::string near = nearest_word(key, known_);
-    offences_.push_back(
-        {join(key), value.dump(), near.empty() ? "no such key" : std::format("no such key; did you mean \"{}\"?", near)});
+    offences_.push_back({join(key), value.dump(),
+                         near.empty() ? "no such key" : std::format("no such key; did you mean \"{}\"?", near)});
   }
 }
 

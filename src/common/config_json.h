@@ -151,7 +151,9 @@ class Loader {
 /// Visitor that writes every value, so that a result can carry exactly what it used.
 class Printer {
  public:
-  void number(std::string_view name, const double& value, Range, std::string_view, std::string_view) { put(name, value); }
+  void number(std::string_view name, const double& value, Range, std::string_view, std::string_view) {
+    put(name, value);
+  }
   void integer(std::string_view name, const int& value, IntRange, std::string_view, std::string_view) {
     put(name, value);
   }

@@ -11,18 +11,18 @@ namespace ignis {
 
 /// What the front end hands to the back end and the map every few metres.
 struct Keyframe {
-  std::int32_t id = 0;               ///< 0, 1, 2 ... never reused within a session
-  std::int32_t session = 0;          ///< +1 per reset of the front end
-  NavState state;                    ///< at the keyframe's instant, frame odom
+  std::int32_t id = 0;                           ///< 0, 1, 2 ... never reused within a session
+  std::int32_t session = 0;                      ///< +1 per reset of the front end
+  NavState state;                                ///< at the keyframe's instant, frame odom
   Matrix15d covariance = Matrix15d::Identity();  ///< order of ErrorBlock
   /// Information that scan matching alone (posterior minus prediction) holds on the pose relative to the previous
   /// keyframe; attitude then position, both in body axes of this keyframe. Zero when no scan was applied.
   Matrix6d scan_information = Matrix6d::Zero();
-  Utime previous_utime = 0;          ///< [us] instant of the previous keyframe; equals state.utime for the first
-  bool stationary = false;           ///< stood still during the whole interval
-  bool imu_complete = true;          ///< false when the interval has an IMU gap
-  std::vector<ImuSample> imu;        ///< all samples with previous_utime <= utime < state.utime
-  std::vector<CloudPoint> cloud;     ///< body frame of the keyframe, downsampled, about one second of scans
+  Utime previous_utime = 0;       ///< [us] instant of the previous keyframe; equals state.utime for the first
+  bool stationary = false;        ///< stood still during the whole interval
+  bool imu_complete = true;       ///< false when the interval has an IMU gap
+  std::vector<ImuSample> imu;     ///< all samples with previous_utime <= utime < state.utime
+  std::vector<CloudPoint> cloud;  ///< body frame of the keyframe, downsampled, about one second of scans
 };
 
 }  // namespace ignis

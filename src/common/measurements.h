@@ -12,11 +12,11 @@
 namespace ignis {
 
 struct ImuSample {
-  Utime utime = 0;                                   ///< [us]
-  std::int32_t sequence = 0;                         ///< +1 per sample of one sender
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();    ///< [rad/s]
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();   ///< [m/s^2] specific force: (0, +g, 0) at rest
-  bool saturated = false;                            ///< an axis stands at the sensor's limit
+  Utime utime = 0;                                  ///< [us]
+  std::int32_t sequence = 0;                        ///< +1 per sample of one sender
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s]
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< [m/s^2] specific force: (0, +g, 0) at rest
+  bool saturated = false;                           ///< an axis stands at the sensor's limit
 };
 
 struct ScanPoint {
@@ -26,10 +26,10 @@ struct ScanPoint {
 };
 
 struct Scan {
-  Utime utime = 0;                    ///< [us] instant of the first point
-  std::int32_t sequence = 0;          ///< +1 per scan of one sender
-  std::int32_t duration_us = 0;       ///< [us] first to last point
-  std::int32_t missing_packets = 0;   ///< sensor packets known to be absent
+  Utime utime = 0;                   ///< [us] instant of the first point
+  std::int32_t sequence = 0;         ///< +1 per scan of one sender
+  std::int32_t duration_us = 0;      ///< [us] first to last point
+  std::int32_t missing_packets = 0;  ///< sensor packets known to be absent
   std::vector<ScanPoint> points;
 
   [[nodiscard]] Utime end_utime() const { return utime + duration_us; }

@@ -14,13 +14,10 @@ Pose Pose::operator*(const Pose& other) const {
   return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
 }
 
-bool Pose::all_finite() const {
-  return rotation.coeffs().allFinite() && translation.allFinite();
-}
+bool Pose::all_finite() const { return rotation.coeffs().allFinite() && translation.allFinite(); }
 
 Pose perturbed_in_body(const Pose& pose, const Vector6d& delta) {
-  return {(pose.rotation * so3::exp(delta.head<3>())).normalized(),
-          pose.translation + pose.rotation * delta.tail<3>()};
+  return {(pose.rotation * so3::exp(delta.head<3>())).normalized(), pose.translation + pose.rotation * delta.tail<3>()};
 }
 
 Vector6d body_difference(const Pose& from, const Pose& to) {

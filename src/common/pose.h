@@ -18,14 +18,12 @@ struct Pose {
 
   [[nodiscard]] Pose inverse() const;
   [[nodiscard]] Pose operator*(const Pose& other) const;
-  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
-    return rotation * point + translation;
-  }
+  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
   [[nodiscard]] bool all_finite() const;
 };
 
-/// Right perturbation: the pose with attitude rotation * exp(delta[0..2]) and translation + rotation * delta[3..5]. Both
-/// halves of delta are in body axes (attitude first), the order GTSAM uses for its Pose3 tangent space.
+/// Right perturbation: the pose with attitude rotation * exp(delta[0..2]) and translation + rotation * delta[3..5].
+/// Both halves of delta are in body axes (attitude first), the order GTSAM uses for its Pose3 tangent space.
 [[nodiscard]] Pose perturbed_in_body(const Pose& pose, const Vector6d& delta);
 
 /// The delta with perturbed_in_body(from, delta) = to.

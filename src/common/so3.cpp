@@ -55,8 +55,7 @@ Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& phi) {
   if (angle < kSmallAngle) {
     return Eigen::Matrix3d::Identity() + 0.5 * S + (1.0 / 12.0 + angle * angle / 720.0) * S * S;
   }
-  const double coefficient =
-      1.0 / (angle * angle) - (1.0 + std::cos(angle)) / (2.0 * angle * std::sin(angle));
+  const double coefficient = 1.0 / (angle * angle) - (1.0 + std::cos(angle)) / (2.0 * angle * std::sin(angle));
   return Eigen::Matrix3d::Identity() + 0.5 * S + coefficient * S * S;
 }
 

@@ -12,9 +12,7 @@ using Utime = std::int64_t;
 inline constexpr std::int64_t kMicrosPerSecond = 1'000'000;
 
 /// Seconds from `from` to `to` [s]. Subtracts as integers first, so nothing is lost.
-[[nodiscard]] constexpr double seconds_between(Utime from, Utime to) {
-  return static_cast<double>(to - from) * 1e-6;
-}
+[[nodiscard]] constexpr double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
 
 /// The nearest whole microsecond of a duration in seconds.
 [[nodiscard]] constexpr std::int64_t to_micros(double seconds) {

@@ -17,11 +17,11 @@ namespace ignis::messages {
 
 /// One published state of the graph.
 struct GraphRevision {
-  Utime utime = 0;              ///< [us] of the newest keyframe
+  Utime utime = 0;  ///< [us] of the newest keyframe
   std::int32_t session = 0;
-  std::int32_t revision = 0;    ///< +1 per published state
-  bool full = false;            ///< all keyframes are listed, not only those that moved
-  std::int32_t keyframes = 0;   ///< in the graph
+  std::int32_t revision = 0;   ///< +1 per published state
+  bool full = false;           ///< all keyframes are listed, not only those that moved
+  std::int32_t keyframes = 0;  ///< in the graph
   std::int32_t newest_id = 0;
   Pose T_map_odom;
   Matrix6d covariance = Matrix6d::Zero();  ///< of the newest pose in map; attitude then position, body axes

@@ -41,7 +41,8 @@ keyframe_t plain_fields(const Keyframe& keyframe) {
   store(keyframe.state.gyro_bias, message.gyro_bias);
   store(keyframe.state.accel_bias, message.accel_bias);
   for (int row = 0; row < 15; ++row) {
-    for (int column = 0; column < 15; ++column) message.covariance[15 * row + column] = keyframe.covariance(row, column);
+    for (int column = 0; column < 15; ++column)
+      message.covariance[15 * row + column] = keyframe.covariance(row, column);
   }
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column) {
@@ -93,7 +94,8 @@ void append_slices(const keyframe_t& part, Keyframe& keyframe) {
   }
   for (std::size_t i = 0; i < part.x.size(); ++i) {
     const Eigen::Vector3f counts(part.x[i], part.y[i], part.z[i]);
-    keyframe.cloud.push_back({.position = counts * part.resolution, .intensity = static_cast<float>(part.intensity[i])});
+    keyframe.cloud.push_back(
+        {.position = counts * part.resolution, .intensity = static_cast<float>(part.intensity[i])});
   }
 }
 

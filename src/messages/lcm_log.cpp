@@ -32,8 +32,8 @@ std::optional<LogEvent> read_record(std::span<const std::byte> file, std::int64_
   event.log_utime = static_cast<std::int64_t>(read_big_endian(file, at + 12, 8));
   event.channel = {reinterpret_cast<const char*>(file.data() + at + kHeadBytes),
                    static_cast<std::size_t>(channel_length)};
-  event.data = file.subspan(static_cast<std::size_t>(at + kHeadBytes + channel_length),
-                            static_cast<std::size_t>(data_length));
+  event.data =
+      file.subspan(static_cast<std::size_t>(at + kHeadBytes + channel_length), static_cast<std::size_t>(data_length));
   return event;
 }
 

@@ -20,8 +20,8 @@ struct LogEvent {
 };
 
 /// Reads LCM event logs and survives damage: LCM's own reader ends silently at the first bad byte and trusts announced
-/// lengths. A record is a 28-byte big-endian head (sync word 0xEDA1DA01, int64 number, int64 time, int32 channel length,
-/// int32 data length), the channel and the data. After damage the search goes on at the next plausible head.
+/// lengths. A record is a 28-byte big-endian head (sync word 0xEDA1DA01, int64 number, int64 time, int32 channel
+/// length, int32 data length), the channel and the data. After damage the search goes on at the next plausible head.
 class LcmLog {
  public:
   /// Maps the file. Throws std::runtime_error that says what is wrong (missing, a folder, empty, no LCM log).

@@ -26,11 +26,11 @@ namespace ignis::messages {
 /// One stretch of an encoded message body (behind the 8-byte fingerprint).
 struct LayoutStep {
   enum Kind : std::uint8_t {
-    kFixed,      ///< `bytes` of plain fields
-    kString,     ///< int32 length including the terminator, then that many bytes
-    kCount,      ///< int32 array count, remembered
-    kArray,      ///< as many elements of `bytes` each as the last count said
-    kStrings,    ///< as many strings as the last count said
+    kFixed,    ///< `bytes` of plain fields
+    kString,   ///< int32 length including the terminator, then that many bytes
+    kCount,    ///< int32 array count, remembered
+    kArray,    ///< as many elements of `bytes` each as the last count said
+    kStrings,  ///< as many strings as the last count said
   };
   Kind kind;
   std::int32_t bytes = 0;
@@ -54,38 +54,49 @@ inline constexpr LayoutStep kState[] = {
 inline constexpr LayoutStep kScanStats[] = {
     {kFixed, 8 + 3 * 4 + 2}, {kString}, {kFixed, 3 * 4 + 5 * 8 + 3 * 8 + 1 + 7 * 8 + 4 + 8}};
 inline constexpr LayoutStep kCloud[] = {{kFixed, 8 + 4 + 2 + 2 + 4 + 1 + 7 * 8}, {kCount}, {kArray, 4 * 4}};
-inline constexpr LayoutStep kKeyframe[] = {
-    {kFixed, 8 + 3 * 4 + 2 + 2 + 8 + 2 + (3 + 4 + 3 + 3 + 3 + 225 + 36) * 8},
-    {kCount},
-    {kArray, 7 * 4},
-    {kCount},
-    {kFixed, 4},
-    {kArray, 3 * 2 + 1}};
+inline constexpr LayoutStep kKeyframe[] = {{kFixed, 8 + 3 * 4 + 2 + 2 + 8 + 2 + (3 + 4 + 3 + 3 + 3 + 225 + 36) * 8},
+                                           {kCount},
+                                           {kArray, 7 * 4},
+                                           {kCount},
+                                           {kFixed, 4},
+                                           {kArray, 3 * 2 + 1}};
 inline constexpr LayoutStep kKeyframeRequest[] = {{kFixed, 8 + 4 + 4}, {kString}, {kCount}, {kArray, 4}};
 inline constexpr LayoutStep kSmoothedKeyframes[] = {
     {kFixed, 8 + 3 * 4 + 2 + 2 + 1 + 2 * 4 + (3 + 4 + 36) * 8}, {kCount}, {kArray, 4 + 7 * 8}};
 inline constexpr LayoutStep kLoopResult[] = {{kFixed, 8 + 5 * 4 + 2}, {kString}, {kFixed, 2 * 4 + 4 * 8 + 7 * 8}};
-inline constexpr LayoutStep kMapStatus[] = {
-    {kFixed, 8 + 5 * 4 + 8 + 2 * 4 + 8 + 8 + 4 + 8 + 8}, {kString}};
+inline constexpr LayoutStep kMapStatus[] = {{kFixed, 8 + 5 * 4 + 8 + 2 * 4 + 8 + 8 + 4 + 8 + 8}, {kString}};
 inline constexpr LayoutStep kPose[] = {{kFixed, 8 + 4 + 10 * 8}};
-inline constexpr LayoutStep kHealth[] = {{kFixed, 8 + 4}, {kString},      {kFixed, 4 + 1},  {kString},
-                                         {kFixed, 4},     {kString},      {kString},        {kFixed, 8},
-                                         {kCount},        {kStrings},     {kArray, 4 * 8}};
+inline constexpr LayoutStep kHealth[] = {{kFixed, 8 + 4}, {kString},  {kFixed, 4 + 1}, {kString},
+                                         {kFixed, 4},     {kString},  {kString},       {kFixed, 8},
+                                         {kCount},        {kStrings}, {kArray, 4 * 8}};
 }  // namespace layouts
 
-template <> inline constexpr std::span<const LayoutStep> kLayout<imu_t> = layouts::kImu;
-template <> inline constexpr std::span<const LayoutStep> kLayout<scan_t> = layouts::kScan;
-template <> inline constexpr std::span<const LayoutStep> kLayout<driver_status_t> = layouts::kDriverStatus;
-template <> inline constexpr std::span<const LayoutStep> kLayout<state_t> = layouts::kState;
-template <> inline constexpr std::span<const LayoutStep> kLayout<scan_stats_t> = layouts::kScanStats;
-template <> inline constexpr std::span<const LayoutStep> kLayout<cloud_t> = layouts::kCloud;
-template <> inline constexpr std::span<const LayoutStep> kLayout<keyframe_t> = layouts::kKeyframe;
-template <> inline constexpr std::span<const LayoutStep> kLayout<keyframe_request_t> = layouts::kKeyframeRequest;
-template <> inline constexpr std::span<const LayoutStep> kLayout<smoothed_keyframes_t> = layouts::kSmoothedKeyframes;
-template <> inline constexpr std::span<const LayoutStep> kLayout<loop_result_t> = layouts::kLoopResult;
-template <> inline constexpr std::span<const LayoutStep> kLayout<map_status_t> = layouts::kMapStatus;
-template <> inline constexpr std::span<const LayoutStep> kLayout<pose_t> = layouts::kPose;
-template <> inline constexpr std::span<const LayoutStep> kLayout<health_t> = layouts::kHealth;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<imu_t> = layouts::kImu;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<scan_t> = layouts::kScan;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<driver_status_t> = layouts::kDriverStatus;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<state_t> = layouts::kState;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<scan_stats_t> = layouts::kScanStats;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<cloud_t> = layouts::kCloud;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<keyframe_t> = layouts::kKeyframe;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<keyframe_request_t> = layouts::kKeyframeRequest;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<smoothed_keyframes_t> = layouts::kSmoothedKeyframes;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<loop_result_t> = layouts::kLoopResult;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<map_status_t> = layouts::kMapStatus;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<pose_t> = layouts::kPose;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<health_t> = layouts::kHealth;
 
 /// Decodes a whole message. Empty result: another type, another version, or a body whose length contradicts its counts.
 template <class Message>

@@ -22,8 +22,7 @@ void store_attitude_for_people(const NavState& state, state_t& message) {
 
 }  // namespace
 
-state_t to_message(const NavState& state, std::int32_t session, const std::string& frame,
-                   const Matrix15d* covariance) {
+state_t to_message(const NavState& state, std::int32_t session, const std::string& frame, const Matrix15d* covariance) {
   state_t message{};
   message.utime = state.utime;
   message.session = session;

@@ -28,10 +28,10 @@ namespace ignis::messages {
 
 /// A deskewed scan in the body frame of its instant.
 struct PosedCloud {
-  Utime utime = 0;             ///< [us] end of the scan
-  std::int32_t sequence = 0;   ///< +1 per cloud
-  std::int32_t session = 0;    ///< +1 per reset of the front end
-  bool applied = false;        ///< the scan corrected the state
+  Utime utime = 0;            ///< [us] end of the scan
+  std::int32_t sequence = 0;  ///< +1 per cloud
+  std::int32_t session = 0;   ///< +1 per reset of the front end
+  bool applied = false;       ///< the scan corrected the state
   Pose T_odom_body;
   std::vector<CloudPoint> points;
 };

@@ -10,9 +10,9 @@ namespace ignis::messages {
 /// Most points in one message: five 4-byte arrays of this many stay below 60 kB, so a part is one datagram.
 inline constexpr std::int64_t kMaxPointsPerPart = 2900;
 
-/// Collects the numbered parts of one sequence and hands them over, in order, when the last one is in. A part of a newer
-/// sequence ends the wait for the older one, which is then counted as incomplete. Parts of one sequence may arrive in
-/// any order and more than once.
+/// Collects the numbered parts of one sequence and hands them over, in order, when the last one is in. A part of a
+/// newer sequence ends the wait for the older one, which is then counted as incomplete. Parts of one sequence may
+/// arrive in any order and more than once.
 template <class Message>
 class PartAssembler {
  public:

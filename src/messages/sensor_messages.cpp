@@ -65,9 +65,8 @@ std::optional<Scan> ScanAssembler::add(const scan_t& part) {
             .points = {}};
   for (const scan_t& each : *parts) {
     for (std::size_t i = 0; i < each.x.size(); ++i) {
-      scan.points.push_back({.position = {each.x[i], each.y[i], each.z[i]},
-                             .intensity = each.intensity[i],
-                             .dt_us = each.dt_us[i]});
+      scan.points.push_back(
+          {.position = {each.x[i], each.y[i], each.z[i]}, .intensity = each.intensity[i], .dt_us = each.dt_us[i]});
     }
   }
   return scan;

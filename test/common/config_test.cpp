@@ -39,7 +39,8 @@ struct Machine {
     visit.list("parts", self.parts, 3, "spare parts");
   }
   void check(Offences& offences, const std::string& path) const {
-    if (mode == "fast" && wheels < 3) offences.push_back({path + "wheels", std::to_string(wheels), "at least 3 when fast"});
+    if (mode == "fast" && wheels < 3)
+      offences.push_back({path + "wheels", std::to_string(wheels), "at least 3 when fast"});
   }
 };
 

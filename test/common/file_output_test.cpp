@@ -31,7 +31,9 @@ TEST_F(FileOutputTest, LeavesTheOldFileAndNoRestWhenAbandoned) {
     first.stream() << "old";
     first.commit();
   }
-  { FileOutput second(folder_ / "result.txt"); }
+  {
+    FileOutput second(folder_ / "result.txt");
+  }
   std::ifstream stream(folder_ / "result.txt");
   std::string text;
   stream >> text;

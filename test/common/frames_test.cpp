@@ -14,16 +14,13 @@ Eigen::Vector3d forward_after(const YawPitchRoll& attitude) {
   return frames::from_yaw_pitch_roll(attitude) * Eigen::Vector3d(0, 0, -1);
 }
 
-TEST(Frames, PositiveYawTurnsTheNoseLeft) {
-  EXPECT_LT(forward_after({.yaw = 0.3, .pitch = 0, .roll = 0}).x(), 0.0);
-}
+TEST(Frames, PositiveYawTurnsTheNoseLeft) { EXPECT_LT(forward_after({.yaw = 0.3, .pitch = 0, .roll = 0}).x(), 0.0); }
 
-TEST(Frames, PositivePitchLiftsTheNose) {
-  EXPECT_GT(forward_after({.yaw = 0, .pitch = 0.3, .roll = 0}).y(), 0.0);
-}
+TEST(Frames, PositivePitchLiftsTheNose) { EXPECT_GT(forward_after({.yaw = 0, .pitch = 0.3, .roll = 0}).y(), 0.0); }
 
 TEST(Frames, PositiveRollLowersTheRightSide) {
-  const Eigen::Vector3d right = frames::from_yaw_pitch_roll({.yaw = 0, .pitch = 0, .roll = 0.3}) * Eigen::Vector3d(1, 0, 0);
+  const Eigen::Vector3d right =
+      frames::from_yaw_pitch_roll({.yaw = 0, .pitch = 0, .roll = 0.3}) * Eigen::Vector3d(1, 0, 0);
   EXPECT_LT(right.y(), 0.0);
 }
 
