@@ -26,6 +26,8 @@ endif()
 if(IGNIS_SANITIZERS)
   add_compile_options(-fsanitize=${IGNIS_SANITIZERS} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${IGNIS_SANITIZERS})
+  # The address sanitizer makes Eigen choose its own allocator, while the packaged libraries use malloc's alignment.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 add_library(ignis_warnings INTERFACE)

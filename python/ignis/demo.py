@@ -168,7 +168,7 @@ class _News:
         elif channel == "LOOP_RESULT":
             self.loops += message.accepted
         else:
-            self.states[message.process] = message.state_text
+            self.states[message.process] = "" if message.state == message.OK else message.state_text
 
     def listen(self, seconds: float) -> None:
         deadline = time.monotonic() + seconds
@@ -176,7 +176,7 @@ class _News:
             self.bus.handle_timeout(int(left * 1000) + 1)
 
     def line(self) -> str:
-        troubles = [f"{name}: {text}" for name, text in sorted(self.states.items()) if not text.startswith("OK")]
+        troubles = [f"{name}: {text}" for name, text in sorted(self.states.items()) if text]
         return "; ".join([f"scans {self.applied}/{self.scans} applied, loops {self.loops}", *troubles])
 
 

@@ -20,7 +20,7 @@ class ProcessDied(RuntimeError):
 def enter_private_network() -> None:
     """Moves this process into a new network namespace whose loopback carries multicast.
 
-    Children inherit it, so nothing that they publish can reach a live robot. Sockets opened before keep their namespace.
+    Children inherit it, so nothing that they publish can reach a live robot. Sockets opened before keep theirs.
     """
     if os.geteuid() == 0:
         os.unshare(os.CLONE_NEWNET)
@@ -46,7 +46,7 @@ def effective_config(config: Path) -> dict:
 
 
 class Pipeline:
-    """Processes of one run. Their output goes to `directory/logs/NAME.log`. Use as a context manager: leaving it ends all."""
+    """Processes of one run; their output goes to `directory/logs/NAME.log`. A context manager: leaving it ends all."""
 
     def __init__(self, directory: Path, lcm_url: str) -> None:
         self.logs = directory / "logs"
@@ -61,7 +61,7 @@ class Pipeline:
         self.stop(*reversed(self.processes))
 
     def start(self, name: str, *arguments: object, listen_fd: int | None = None) -> subprocess.Popen:
-        """Starts one executable of the build (or a tool on the PATH). `listen_fd` is handed over by socket activation."""
+        """Starts an executable of the build or a tool on the PATH. `listen_fd` is handed over by socket activation."""
         program = binary(name) if binary(name).exists() else name
         command = [str(program), *map(str, arguments)]
         environment = dict(self.environment)
