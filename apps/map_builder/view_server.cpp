@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <format>
+#include <tuple>
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -176,7 +177,7 @@ net::awaitable<void> ViewServer::serve_requests(beast::tcp_stream& stream) {
     if (write_error) co_return;
   }
   beast::error_code ignored;
-  stream.socket().shutdown(net::ip::tcp::socket::shutdown_send, ignored);
+  std::ignore = stream.socket().shutdown(net::ip::tcp::socket::shutdown_send, ignored);
 }
 
 ViewServer::Response ViewServer::answer(const Request& request) const {

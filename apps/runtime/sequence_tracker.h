@@ -10,10 +10,10 @@ namespace ignis::runtime {
 class SequenceTracker {
  public:
   /// Messages missed between the newest one seen so far and this one. Parts of one sequence, repeats and late arrivals
-  /// count nothing. A number far below the newest means that the sender started again.
+  /// count nothing; keyframes sent again have old numbers. A number far below the newest means a new sender.
   std::int64_t observe(std::int32_t sequence) {
     constexpr std::int32_t kRestartDistance = 1000;
-    if (!newest_ || sequence < *newest_ - kRestartDistance || (sequence == 0 && *newest_ > 0)) {
+    if (!newest_ || sequence < *newest_ - kRestartDistance) {
       newest_ = sequence;
       return 0;
     }

@@ -7,6 +7,7 @@ listening socket belongs to the host's.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import socket
@@ -173,7 +174,9 @@ class _News:
     def listen(self, seconds: float) -> None:
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
-            self.bus.handle_timeout(int(left * 1000) + 1)
+            # A signal makes LCM fail with an OSError before Python raises what the signal stands for.
+            with contextlib.suppress(OSError):
+                self.bus.handle_timeout(int(left * 1000) + 1)
 
     def line(self) -> str:
         troubles = [f"{name}: {text}" for name, text in sorted(self.states.items()) if text]

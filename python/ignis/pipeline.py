@@ -10,6 +10,8 @@ import subprocess
 import time
 from pathlib import Path
 
+import lcm
+
 STOP_SECONDS = 10.0
 
 
@@ -45,6 +47,18 @@ def effective_config(config: Path) -> dict:
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
+def program(name: str) -> Path:
+    """An executable of the build, or one of LCM's own tools.
+
+    LCM's wheel puts Python scripts of the same names on the PATH, which kill the tool when they are interrupted: a
+    logger would lose the end of its log.
+    """
+    if binary(name).exists():
+        return binary(name)
+    tool = Path(lcm.LCM_BIN_DIR) / name
+    return tool if tool.exists() else Path(name)
+
+
 class Pipeline:
     """Processes of one run; their output goes to `directory/logs/NAME.log`. A context manager: leaving it ends all."""
 
@@ -62,8 +76,7 @@ class Pipeline:
 
     def start(self, name: str, *arguments: object, listen_fd: int | None = None) -> subprocess.Popen:
         """Starts an executable of the build or a tool on the PATH. `listen_fd` is handed over by socket activation."""
-        program = binary(name) if binary(name).exists() else name
-        command = [str(program), *map(str, arguments)]
+        command = [str(program(name)), *map(str, arguments)]
         environment = dict(self.environment)
         if listen_fd is not None:
             # systemd's protocol wants the socket at number 3; the shell moves it there.

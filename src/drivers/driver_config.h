@@ -36,7 +36,7 @@ struct DriverConfig {
   double clock_window_s = 10.0;
   int packets_per_scan = 9;
   double range_min_m = 0.2;
-  double range_max_m = 30.0;
+  double range_max_m = 15.0;
   double range_scale = 0.001;
   double range_bias_m = 0.0;
   double yaw_bias_deg = -38.5;
