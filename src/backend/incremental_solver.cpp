@@ -197,12 +197,13 @@ double IncrementalSolver::half_chi_square(FactorId factor) {
 
 std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint64_t key) const {
   try {
-    const Eigen::MatrixXd covariance = impl_->isam.marginalCovariance(key);
-    if (covariance.allFinite()) return covariance;
+    Eigen::MatrixXd covariance = impl_->isam.marginalCovariance(key);
+    if (!covariance.allFinite()) return std::nullopt;
+    return covariance;
   } catch (const std::exception&) {
     // The covariance is an extra: without it the pose still stands.
+    return std::nullopt;
   }
-  return std::nullopt;
 }
 
 int IncrementalSolver::rebuilds() const { return impl_->rebuilds; }

@@ -81,7 +81,7 @@ std::optional<Hit> RayScene::cast(const Ray& ray, double limit) const {
     if (pending.entry >= limit) continue;
     const Node& node = nodes_[static_cast<std::size_t>(pending.node)];
     for (int i = 0; i < node.count; ++i) {
-      keep(intersect(solids_[static_cast<std::size_t>(node.first + i)], ray, limit));
+      keep(intersect(solids_[static_cast<std::size_t>(node.first) + static_cast<std::size_t>(i)], ray, limit));
     }
     if (node.count > 0) continue;
     Pending near{pending.node + 1, 0.0};
