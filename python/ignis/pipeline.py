@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import lcm
@@ -107,7 +108,17 @@ class Pipeline:
                 raise ProcessDied(f"{name} ended with code {code}: {self.last_words(name)}")
 
     def stop(self, *names: str) -> None:
-        """Asks each process to end and waits for it; kills what does not end in time."""
+        """Asks each process to end and waits for it; kills what does not end in time.
+
+        A second Ctrl-C must not leave processes behind, so it waits until all have ended.
+        """
+        previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            self._stop(names)
+        finally:
+            signal.signal(signal.SIGINT, previous)
+
+    def _stop(self, names: Sequence[str]) -> None:
         for name in names:
             process = self.processes.pop(name, None)
             if process is None or process.poll() is not None:
