@@ -118,7 +118,7 @@ std::string ImuInitialisation::scale_refusal(double norm) const {
 }
 
 std::string ImuInitialisation::refusal(const Window& window) const {
-  const std::string scale = scale_refusal(window.accel_mean.norm());
+  std::string scale = scale_refusal(window.accel_mean.norm());
   if (!scale.empty()) return scale;
   const bool accel_quiet = window.accel_sigma <= config_.rest_accel_sigma;
   const double gyro = window.gyro_mean.norm();

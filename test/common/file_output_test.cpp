@@ -3,17 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include "test_folder.h"
+
 namespace ignis {
 namespace {
 
 class FileOutputTest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(testing::TempDir()) / "file_output_test";
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  std::filesystem::path folder_;
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_ = test::fresh_folder();
 };
 
 TEST_F(FileOutputTest, AppearsUnderItsNameOnlyAfterCommit) {

@@ -8,14 +8,15 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "test_folder.h"
+
 namespace ignis::messages {
 namespace {
 
 class LcmLogTest : public testing::Test {
  protected:
   void SetUp() override {
-    file_ = std::filesystem::path(testing::TempDir()) / "lcm_log_test.lcmlog";
-    std::filesystem::remove(file_);
+    file_ = folder_ / "test.lcmlog";
     // LCM's own writer is the oracle of the format.
     lcm::LogFile writer(file_.string(), "w");
     ASSERT_TRUE(writer.good());
@@ -30,6 +31,8 @@ class LcmLogTest : public testing::Test {
       ASSERT_EQ(writer.writeEvent(&event), 0);
     }
   }
+
+  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   [[nodiscard]] std::vector<char> bytes() const {
     std::ifstream stream(file_, std::ios::binary);
@@ -47,6 +50,7 @@ class LcmLogTest : public testing::Test {
   }
 
   static constexpr int kRecords = 40;
+  std::filesystem::path folder_ = test::fresh_folder();
   std::filesystem::path file_;
 };
 
