@@ -9,8 +9,8 @@ namespace {
 Pose at(double x) { return {Eigen::Quaterniond::Identity(), {x, 0.0, 0.0}}; }
 
 TEST(CorrectedTrajectory, InterpolatesTheCorrectionBetweenKeyframesAndHoldsItOutside) {
-  const Trajectory odometry = {{0, at(0.0)}, {1'000'000, at(1.0)}, {2'000'000, at(2.0)}, {3'000'000, at(3.0)},
-                               {4'000'000, at(4.0)}};
+  const Trajectory odometry = {
+      {0, at(0.0)}, {1'000'000, at(1.0)}, {2'000'000, at(2.0)}, {3'000'000, at(3.0)}, {4'000'000, at(4.0)}};
   // The first keyframe stays, the second one moves back by 0.4 m.
   const std::vector<KeyframeCorrection> keyframes = {{1'000'000, at(1.0), at(1.0)}, {3'000'000, at(3.0), at(2.6)}};
   const Trajectory corrected = corrected_trajectory(odometry, keyframes);

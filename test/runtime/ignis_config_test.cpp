@@ -38,8 +38,8 @@ TEST(IgnisConfig, HashDependsOnValuesAndNotOnLayout) {
 
 TEST(IgnisConfig, FilterAndLoopGatesShareOneSectionAndAreCheckedTogether) {
   try {
-    (void)config::load<IgnisConfig>(
-        config::parse_json(R"({"frontend": {"loop_radius_m": -1, "max_range_m": 0.1}, "map": {"mid_cell_m": 0.3}})", "t"));
+    (void)config::load<IgnisConfig>(config::parse_json(
+        R"({"frontend": {"loop_radius_m": -1, "max_range_m": 0.1}, "map": {"mid_cell_m": 0.3}})", "t"));
     FAIL() << "no error";
   } catch (const config::ConfigError& error) {
     for (const char* part : {"frontend.loop_radius_m", "frontend.max_range_m", "map.mid_cell_m"}) {
