@@ -15,6 +15,7 @@ set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 add_link_options(LINKER:--as-needed)
 
 option(IGNIS_WARNINGS_AS_ERRORS "Treat warnings as errors" OFF)
+option(IGNIS_FUZZ "Build the fuzz targets (clang)" OFF)
 set(IGNIS_SANITIZERS "" CACHE STRING "Value for -fsanitize=, for example address,undefined")
 
 find_program(CCACHE_PROGRAM ccache)
@@ -24,7 +25,7 @@ if(CCACHE_PROGRAM)
 endif()
 
 if(IGNIS_SANITIZERS)
-  add_compile_options(-fsanitize=${IGNIS_SANITIZERS} -fno-omit-frame-pointer)
+  add_compile_options(-fsanitize=${IGNIS_SANITIZERS} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${IGNIS_SANITIZERS})
   # The address sanitizer makes Eigen choose its own allocator, while the packaged libraries use malloc's alignment.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)

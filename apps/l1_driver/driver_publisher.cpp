@@ -12,22 +12,33 @@ namespace ignis::runtime {
 
 void DriverPublisher::publish(const l1::Event& event) {
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
-    link_.publish(channels::kImu, messages::to_message(*sample, decoder_.housekeeping().imu_temperature));
+    bus_.publish(channels::kImu, messages::to_message(*sample, decoder_.housekeeping().imu_temperature));
     return;
   }
-  for (const scan_t& part : messages::to_messages(std::get<Scan>(event))) link_.publish(channels::kScan, part);
+  for (const scan_t& part : messages::to_messages(std::get<Scan>(event))) bus_.publish(channels::kScan, part);
 }
 
-void DriverPublisher::report(Utime now, bool connected) {
-  const l1::SensorReport report = watch_.look(now, connected, decoder_.counters(), decoder_.health());
-  link_.report_health(decoder_.newest_utime(), report.degraded ? health_t::DEGRADED : health_t::OK, report.text);
-  if (now - last_status_ < kMicrosPerSecond && report.text == last_text_) return;
+void DriverPublisher::report(Utime now, const LinkReport& link) {
+  const l1::SensorReport sensor = watch_.look(now, link.connected, decoder_.counters(), decoder_.health());
+  report_health(sensor, link);
+  // On change of the judgement, not of its figures: a line that stays bad must not flood the bus.
+  const bool changed = sensor.state != last_state_ || sensor.severity != last_severity_;
+  if (now - last_status_ < kMicrosPerSecond && !changed) return;
   last_status_ = now;
-  last_text_ = report.text;
-  publish_status(report);
+  last_state_ = sensor.state;
+  last_severity_ = sensor.severity;
+  publish_status(sensor, link);
 }
 
-void DriverPublisher::publish_status(const l1::SensorReport& report) {
+void DriverPublisher::report_health(const l1::SensorReport& sensor, const LinkReport& link) {
+  std::int8_t state = health_t::OK;
+  if (sensor.severity == l1::Severity::kDegraded || !link.trouble.empty()) state = health_t::DEGRADED;
+  if (sensor.severity == l1::Severity::kFault) state = health_t::FAULT;
+  const std::string text = link.trouble.empty() ? sensor.text : sensor.text + "; " + link.trouble;
+  bus_.report_health(decoder_.newest_utime(), state, text);
+}
+
+void DriverPublisher::publish_status(const l1::SensorReport& report, const LinkReport& link) {
   const l1::DecoderCounters counters = decoder_.counters();
   const l1::Housekeeping& housekeeping = decoder_.housekeeping();
   driver_status_t status;
@@ -51,6 +62,9 @@ void DriverPublisher::publish_status(const l1::SensorReport& report) {
   status.scans_published = counters.scans_published;
   status.points_published = counters.points_published;
   status.points_filtered = counters.points_filtered;
+  status.foreign_datagrams = link.refused;
+  status.clock_epoch = static_cast<std::int32_t>(counters.restarts);
+  status.sensor_time_s = housekeeping.sensor_time_s;
   status.clock_offset_us = decoder_.clock().offset_us();
   status.clock_drift_ppm = decoder_.clock().drift_ppm();
   status.clock_jitter_us = decoder_.clock().jitter_us();
@@ -60,7 +74,7 @@ void DriverPublisher::publish_status(const l1::SensorReport& report) {
   status.work_status = housekeeping.work_status;
   status.work_status_text = l1::work_status_text(housekeeping.work_status);
   status.firmware = housekeeping.firmware;
-  link_.publish(channels::kDriverStatus, status);
+  bus_.publish(channels::kDriverStatus, status);
 }
 
 }  // namespace ignis::runtime

@@ -7,24 +7,35 @@
 
 namespace ignis::runtime {
 
+/// How the driver's own surroundings are.
+struct LinkReport {
+  bool connected = false;
+  std::int64_t refused = 0;  ///< deliveries from strangers
+  std::string trouble = {};  ///< of the recording; empty: none
+};
+
 /// Puts what the decoder gives on the bus: L1_IMU, L1_SCAN, and once a second L1_STATUS and HEALTH.
 class DriverPublisher {
  public:
-  DriverPublisher(LcmLink& link, const l1::L1Decoder& decoder) : link_(link), decoder_(decoder) {}
+  /// `source`: the port or file in words.
+  DriverPublisher(LcmLink& bus, const l1::L1Decoder& decoder, std::string source)
+      : bus_(bus), decoder_(decoder), watch_(std::move(source)) {}
 
   void publish(const l1::Event& event);
 
   /// Looks at the sensor; publishes when a second has passed or its state has changed. `now`: any steady clock [us].
-  void report(Utime now, bool connected);
+  void report(Utime now, const LinkReport& link);
 
  private:
-  void publish_status(const l1::SensorReport& report);
+  void report_health(const l1::SensorReport& sensor, const LinkReport& link);
+  void publish_status(const l1::SensorReport& report, const LinkReport& link);
 
-  LcmLink& link_;
+  LcmLink& bus_;
   const l1::L1Decoder& decoder_;
   l1::SensorWatch watch_;
   Utime last_status_ = 0;
-  std::string last_text_;
+  l1::SensorState last_state_ = l1::SensorState::kWaiting;
+  l1::Severity last_severity_ = l1::Severity::kOk;
   std::int32_t status_sequence_ = 0;
 };
 

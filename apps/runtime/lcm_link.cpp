@@ -9,6 +9,7 @@ namespace ignis::runtime {
 namespace {
 
 constexpr std::chrono::seconds kHealthPeriod{1};
+constexpr std::chrono::milliseconds kTextPeriod{200};
 
 std::string cannot_open(const std::string& url) {
   std::string text = std::format("cannot open the message bus {}.", url);
@@ -45,8 +46,11 @@ bool LcmLink::handle(int timeout_ms) { return lcm_.handleTimeout(timeout_ms) > 0
 
 void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets) {
   const auto now = std::chrono::steady_clock::now();
-  if (now - last_health_ < kHealthPeriod && state_text == last_state_text_) return;
+  // A text may hold figures that change all the time.
+  const bool due = now - last_health_ >= (state_text == last_state_text_ ? kHealthPeriod : kTextPeriod);
+  if (!due && state == last_state_) return;
   last_health_ = now;
+  last_state_ = state;
   last_state_text_ = state_text;
   health_t message;
   message.utime = utime;

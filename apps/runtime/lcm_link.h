@@ -63,8 +63,8 @@ class LcmLink {
   /// Waits at most `timeout_ms` for one message and handles it. True when one was handled.
   bool handle(int timeout_ms);
 
-  /// Publishes HEALTH when a second has passed or `state` changed. `utime`: newest measurement seen [us]. `state`: one
-  /// of health_t's constants.
+  /// Publishes HEALTH when a second has passed, at once when `state` changed, and for a new text every 200 ms.
+  /// `utime`: newest measurement seen [us]. `state`: one of health_t's constants.
   void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
 
   [[nodiscard]] std::int64_t failed_sends() const { return failed_sends_; }
@@ -86,6 +86,7 @@ class LcmLink {
   std::int64_t failed_sends_ = 0;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point last_health_{};
+  std::int8_t last_state_ = -1;
   std::string last_state_text_;
   std::int32_t health_sequence_ = 0;
 };

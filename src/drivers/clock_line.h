@@ -26,6 +26,9 @@ class ClockLine {
   /// for a second, mean that the counter lost its meaning: the fit starts afresh from it.
   void add(std::int64_t count, double time_us);
 
+  /// Starts afresh from the next datum.
+  void forget() { best_.clear(); }
+
   [[nodiscard]] bool empty() const { return best_.empty(); }
   /// [us] the line's time at a count; 0 while empty.
   [[nodiscard]] double at(std::int64_t count) const;

@@ -10,6 +10,7 @@ std::int64_t CounterUnwrapper::advance(std::uint16_t id, double elapsed_us, doub
   if (!last_id_) count_ = id;
   const int difference = last_id_ ? static_cast<int>(id) - static_cast<int>(*last_id_) : 0;
   last_id_ = id;
+  guessed_ = false;
   if (difference == 0) return 0;
   const std::int64_t step = step_from(difference, elapsed_us, slack_us);
   count_ += step;
@@ -20,6 +21,7 @@ std::int64_t CounterUnwrapper::step_from(int difference, double elapsed_us, doub
   const auto plausible = [&](int step) { return step > 0 && step * period_us_ <= elapsed_us + slack_us; };
   if (plausible(difference)) return difference;
   if (plausible(difference + modulus_)) return difference + modulus_;
+  guessed_ = true;
   const auto step = std::max<std::int64_t>(1, std::llround(elapsed_us / period_us_));
   // A step back with hardly any time lost shows the modulus; a longer one may as well be a restart of the sensor.
   if (difference < 0 && step == 1) modulus_ = 1 - difference;

@@ -17,6 +17,9 @@ class CounterUnwrapper {
   /// `elapsed_us`: about how much time passed since the previous id. `slack_us`: how far that may be too short.
   [[nodiscard]] std::int64_t advance(std::uint16_t id, double elapsed_us, double slack_us);
 
+  /// Whether the latest step was taken from the elapsed time because the ids alone did not explain it.
+  [[nodiscard]] bool guessed() const { return guessed_; }
+
   /// The first id plus all steps since.
   [[nodiscard]] std::int64_t count() const { return count_; }
   [[nodiscard]] std::optional<std::uint16_t> last_id() const { return last_id_; }
@@ -28,6 +31,7 @@ class CounterUnwrapper {
   std::optional<std::uint16_t> last_id_;
   int modulus_ = 65536;
   std::int64_t count_ = 0;
+  bool guessed_ = false;
 };
 
 }  // namespace ignis::l1

@@ -47,7 +47,8 @@ struct DriverConfig {
   std::vector<OwnStructureBox> own_structure;
 
   void visit_fields(this auto& self, auto& visit) {
-    visit.text("port", self.port, "serial device or pty of the sensor");
+    visit.text("port", self.port,
+               "serial device or pty of the sensor, or udp://ADDRESS:PORT to listen on for its UDP board");
     visit.integer("baud", self.baud, {9600, 4'000'000}, "baud", "line speed, 8N1");
     visit.choice(
         "time_source", self.time_source, {"arrival", "counters"},
@@ -74,11 +75,7 @@ struct DriverConfig {
                "refuse packets that announce another size than 240 and 120");
     visit.list("own_structure", self.own_structure, 32, "boxes around parts of the vehicle that the sensor sees");
   }
-  void check(config::Offences& offences, const std::string& path) const {
-    if (range_min_m < range_max_m) return;
-    offences.push_back({path + ".range_max_m", std::format("{}", range_max_m),
-                        std::format("more than range_min_m = {}", range_min_m)});
-  }
+  void check(config::Offences& offences, const std::string& path) const;
 };
 
 /// The L1 tilted 45 degrees forward at the body origin; its inertial unit sits where the vendor's data sheet says.

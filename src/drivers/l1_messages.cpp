@@ -105,6 +105,12 @@ void visit(auto& io, auto& message)
   io(message.count), io(message.type);
 }
 
+void visit(auto& io, auto& message)
+  requires requires { message.table; }
+{
+  io(message.rotation_period), io(message.zero_offset_ms), io(message.packet_id), io(message.mode), io(message.table);
+}
+
 template <class Message>
 Payload encoded(const Message& message) {
   Writer writer;
@@ -133,6 +139,7 @@ Payload encode(const Auxiliary& message) { return encoded(message); }
 Payload encode(const ImuAttitude& message) { return encoded(message); }
 Payload encode(const Version& message) { return encoded(message); }
 Payload encode(const TimeSync& message) { return encoded(message); }
+Payload encode(const LedRing& message) { return encoded(message); }
 Payload encode(DataRequest request) { return {static_cast<std::byte>(std::to_underlying(request))}; }
 Payload encode(WorkingMode mode) { return {static_cast<std::byte>(std::to_underlying(mode))}; }
 
@@ -141,6 +148,7 @@ Auxiliary decode_auxiliary(std::span<const std::byte> payload) { return decoded<
 ImuAttitude decode_imu(std::span<const std::byte> payload) { return decoded<ImuAttitude>(payload); }
 Version decode_version(std::span<const std::byte> payload) { return decoded<Version>(payload); }
 TimeSync decode_time_sync(std::span<const std::byte> payload) { return decoded<TimeSync>(payload); }
+LedRing decode_led_ring(std::span<const std::byte> payload) { return decoded<LedRing>(payload); }
 std::uint8_t decode_byte(std::span<const std::byte> payload) {
   return payload.empty() ? std::uint8_t{0} : std::to_integer<std::uint8_t>(payload.front());
 }

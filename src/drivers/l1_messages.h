@@ -100,6 +100,17 @@ struct TimeSync {
   std::uint8_t type = kRequest;
 };
 
+/// Light ring on the rotor. Modes: 1 shows the table, 2..8 are built-in patterns that ignore it.
+struct LedRing {
+  static constexpr std::uint8_t kTableMode = 1;
+  static constexpr std::uint8_t kLastMode = 8;
+  std::uint32_t rotation_period = 0;
+  std::uint32_t zero_offset_ms = 0;
+  std::uint16_t packet_id = 0;
+  std::uint8_t mode = kTableMode;
+  std::array<std::uint8_t, 45> table{};  ///< 360 bits, one per degree
+};
+
 /// Values of the one-byte host messages RequestData (11) and WorkingMode (14).
 enum class DataRequest : std::uint8_t { kClockSync = 1, kVersion = 2 };
 enum class WorkingMode : std::uint8_t { kNormal = 1, kStandby = 2, kRaw = 3 };
@@ -111,6 +122,7 @@ using Payload = std::vector<std::byte>;
 [[nodiscard]] Payload encode(const ImuAttitude& message);
 [[nodiscard]] Payload encode(const Version& message);
 [[nodiscard]] Payload encode(const TimeSync& message);
+[[nodiscard]] Payload encode(const LedRing& message);
 [[nodiscard]] Payload encode(DataRequest request);
 [[nodiscard]] Payload encode(WorkingMode mode);
 
@@ -119,8 +131,12 @@ using Payload = std::vector<std::byte>;
 [[nodiscard]] ImuAttitude decode_imu(std::span<const std::byte> payload);
 [[nodiscard]] Version decode_version(std::span<const std::byte> payload);
 [[nodiscard]] TimeSync decode_time_sync(std::span<const std::byte> payload);
+[[nodiscard]] LedRing decode_led_ring(std::span<const std::byte> payload);
 /// The value of a one-byte host message (RequestData, WorkingMode); 0 when the payload is empty.
 [[nodiscard]] std::uint8_t decode_byte(std::span<const std::byte> payload);
+
+/// Bits of Auxiliary::work_status that the driver acts on.
+inline constexpr std::uint8_t kLedPatternBit = 0x08;
 
 /// The set bits of Auxiliary::work_status in words, separated by commas; empty when none is set.
 [[nodiscard]] std::string work_status_text(std::uint8_t status);

@@ -68,6 +68,12 @@ void SensorClock::bound_imu_from_above(double sent_us) {
   awaiting_upper_.clear();
 }
 
+void SensorClock::restart() {
+  for (ClockLine* line : {&scan_line_, &imu_upper_, &imu_lower_}) line->forget();
+  last_auxiliary_us_.reset();
+  awaiting_upper_.clear();
+}
+
 bool SensorClock::ready() const {
   return by_arrival_ || (imu_upper_.span_us() >= kAlignedAfterUs && imu_lower_.span_us() >= kAlignedAfterUs);
 }

@@ -42,6 +42,9 @@ class SensorClock {
   void on_distance(std::int64_t count);
   void on_imu(std::int64_t count, double sent_before_us);
 
+  /// The counters lost their phase: what was learnt of them is forgotten. Stamps go on without stepping back.
+  void restart();
+
   /// False while the two streams of a capture are not yet aligned: events should wait.
   [[nodiscard]] bool ready() const;
   /// [us] first point of packet `count`. Call once per packet, in order.

@@ -10,6 +10,8 @@ namespace {
 
 constexpr Utime kStreamMissingUs = 250'000;
 constexpr Utime kStandbyUs = 1'000'000;
+constexpr Utime kPatienceUs = 1'000'000;
+constexpr Utime kProbationUs = 1'000'000;
 constexpr int kFrozenSamples = 25;
 constexpr int kRejectedIsFault = 50;
 
@@ -23,30 +25,60 @@ void SensorWatch::Activity::update(std::int64_t count, Utime now) {
 }
 
 SensorReport SensorWatch::look(Utime now, bool connected, const DecoderCounters& counters, const SensorHealth& health) {
+  if (connected && !was_connected_) connected_at_ = now;
+  was_connected_ = connected;
+  bytes_.update(counters.framing.bytes, now);
   imu_.update(counters.imu_published, now);
   packets_.update(counters.pairing.paired, now);
-  if (!connected) return {SensorState::kDisconnected, true, "port is not open, trying again"};
+  SensorReport report = judge(now, connected, health);
+  if (report.severity != Severity::kOk) {
+    trouble_at_ = now;
+    trouble_ = report.text;
+  } else if (!trouble_.empty() && now - trouble_at_ < kProbationUs) {
+    report.severity = Severity::kDegraded;
+    report.text = std::format("running again, but a moment ago: {}", trouble_);
+  }
+  return report;
+}
+
+SensorReport SensorWatch::judge(Utime now, bool connected, const SensorHealth& health) const {
+  if (!connected) return {SensorState::kDisconnected, Severity::kFault, std::format("{} is gone, trying again", link_)};
   if (health.rejected_in_a_row >= kRejectedIsFault) {
-    return {SensorState::kRunning, true,
+    return {SensorState::kRunning, Severity::kFault,
             std::format("{} frames in a row with impossible {}", health.rejected_in_a_row, health.rejected_field)};
   }
+  if (imu_.quiet_for(now, kStreamMissingUs) && packets_.quiet_for(now, kStreamMissingUs)) return judge_silence(now);
   return judge_streams(now, health);
 }
 
+SensorReport SensorWatch::judge_silence(Utime now) const {
+  const bool ever = imu_.ever || packets_.ever;
+  const Utime since = ever ? std::max(imu_.moved_at, packets_.moved_at) : connected_at_;
+  const Severity severity = now - since > kPatienceUs ? Severity::kFault : Severity::kDegraded;
+  const SensorState state = ever ? SensorState::kSilent : SensorState::kWaiting;
+  if (!bytes_.quiet_for(now, kStreamMissingUs)) {
+    return {state, severity,
+            std::format("{}: {} bytes so far, but {}: wrong speed, another device, or a damaged line", link_,
+                        bytes_.seen, ever ? "no valid frame any more" : "no valid frame among them")};
+  }
+  return {state, severity,
+          ever ? std::format("{}: the sensor has stopped sending after {} bytes", link_, bytes_.seen)
+               : std::format("{}: no byte from the sensor yet; has it power?", link_)};
+}
+
 SensorReport SensorWatch::judge_streams(Utime now, const SensorHealth& health) const {
-  const bool no_imu = imu_.quiet_for(now, kStreamMissingUs);
   const bool no_packets = packets_.quiet_for(now, kStreamMissingUs);
-  if (no_imu && no_packets) {
-    if (!imu_.ever && !packets_.ever) return {SensorState::kWaiting, true, "no valid frame from the sensor yet"};
-    return {SensorState::kSilent, true, "the sensor has stopped sending"};
+  if (imu_.quiet_for(now, kStreamMissingUs)) {
+    return {SensorState::kRunning, Severity::kDegraded, "scans come, but no inertial data"};
   }
-  if (no_imu) return {SensorState::kRunning, true, "scans come, but no inertial data"};
   if (no_packets && packets_.quiet_for(now, kStandbyUs)) {
-    return {SensorState::kStandby, true, "inertial data only: standby, or the rotor is blocked"};
+    return {SensorState::kStandby, Severity::kDegraded, "inertial data only: standby, or the rotor is blocked"};
   }
-  if (no_packets) return {SensorState::kRunning, true, "inertial data come, but no scans"};
-  if (health.equal_imu_samples >= kFrozenSamples) return {SensorState::kRunning, true, "inertial values are frozen"};
-  return {SensorState::kRunning, false, "running"};
+  if (no_packets) return {SensorState::kRunning, Severity::kDegraded, "inertial data come, but no scans"};
+  if (health.equal_imu_samples >= kFrozenSamples) {
+    return {SensorState::kRunning, Severity::kDegraded, "inertial values are frozen"};
+  }
+  return {SensorState::kRunning, Severity::kOk, "running"};
 }
 
 }  // namespace ignis::l1

@@ -57,7 +57,7 @@ bool is_pty(int fd) {
 
 SerialPort::SerialPort(const std::filesystem::path& device, int baud)
     : device_(device), fd_(open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
-  if (fd_ < 0) throw SerialError(open_error(device_.string(), errno));
+  if (fd_ < 0) throw LinkError(open_error(device_.string(), errno));
   try {
     claim();
     configure(baud);
@@ -74,18 +74,18 @@ SerialPort::~SerialPort() {
 
 void SerialPort::claim() {
   if (isatty(fd_) == 0) {
-    throw SerialError(
+    throw LinkError(
         std::format("{} is not a serial port; a recorded byte stream is read with --capture", device_.string()));
   }
   // TIOCEXCL keeps other programs out, but not those of root; flock keeps out all who ask.
-  if (flock(fd_, LOCK_EX | LOCK_NB) != 0) throw SerialError(open_error(device_.string(), EBUSY));
+  if (flock(fd_, LOCK_EX | LOCK_NB) != 0) throw LinkError(open_error(device_.string(), EBUSY));
   ioctl(fd_, TIOCEXCL);
 }
 
 void SerialPort::configure(int baud) {
   struct termios2 settings{};
   if (ioctl(fd_, TCGETS2, &settings) != 0) {
-    throw SerialError(
+    throw LinkError(
         std::format("cannot read the settings of serial port {}: {}", device_.string(), std::strerror(errno)));
   }
   settings.c_iflag = 0;
@@ -97,8 +97,8 @@ void SerialPort::configure(int baud) {
   settings.c_cc[VMIN] = 0;
   settings.c_cc[VTIME] = 0;
   if (ioctl(fd_, TCSETS2, &settings) != 0) {
-    throw SerialError(std::format("serial port {} refuses {} baud 8N1: {}; use an adapter that supports it",
-                                  device_.string(), baud, std::strerror(errno)));
+    throw LinkError(std::format("serial port {} refuses {} baud 8N1: {}; use an adapter that supports it",
+                                device_.string(), baud, std::strerror(errno)));
   }
   if (!is_pty(fd_)) ioctl(fd_, TCFLSH, TCIFLUSH);
 }
@@ -127,7 +127,7 @@ void SerialPort::write(std::span<const std::byte> bytes) {
 }
 
 void SerialPort::lost(const std::string& reason) const {
-  throw SerialError(std::format("serial port {} is gone: {}", device_.string(), reason));
+  throw LinkError(std::format("serial port {} is gone: {}", device_.string(), reason));
 }
 
 }  // namespace ignis::l1

@@ -48,7 +48,7 @@ using enum LayoutStep::Kind;
 inline constexpr LayoutStep kImu[] = {{kFixed, 8 + 4 + 24 + 24 + 4 + 1}};
 inline constexpr LayoutStep kScan[] = {{kFixed, 8 + 4 + 2 + 2 + 4 + 4}, {kCount}, {kArray, 5 * 4}};
 inline constexpr LayoutStep kDriverStatus[] = {
-    {kFixed, 8 + 4 + 1}, {kString}, {kFixed, 16 * 8 + 3 * 8 + 3 * 4 + 4}, {kString}, {kString}};
+    {kFixed, 8 + 4 + 1}, {kString}, {kFixed, 17 * 8 + 4 + 4 * 8 + 3 * 4 + 4}, {kString}, {kString}};
 inline constexpr LayoutStep kState[] = {
     {kFixed, 8 + 4 + 4}, {kString}, {kFixed, (3 + 4 + 3 + 6 + 9) * 8 + 1}, {kCount}, {kArray, 8}};
 inline constexpr LayoutStep kScanStats[] = {

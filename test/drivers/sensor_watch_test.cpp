@@ -6,66 +6,97 @@
 namespace ignis::l1 {
 namespace {
 
-/// Looks every 50 ms for `seconds`, while the given streams run.
-SensorReport watch(SensorWatch& watch, DecoderCounters& counters, Utime& now, double seconds, bool imu, bool packets,
-                   const SensorHealth& health = {}) {
-  SensorReport report;
-  for (int i = 0; i < seconds * 20; ++i) {
-    now += 50'000;
-    if (imu) counters.imu_published += 12;
-    if (packets) counters.pairing.paired += 9;
-    report = watch.look(now, true, counters, health);
-  }
-  return report;
-}
-
 class SensorWatchTest : public ::testing::Test {
  protected:
+  /// Looks every 50 ms for `seconds`, while the given streams run.
   SensorReport run(double seconds, bool imu, bool packets, const SensorHealth& health = {}) {
-    return watch(watch_, counters_, now_, seconds, imu, packets, health);
+    SensorReport report;
+    for (int i = 0; i < seconds * 20; ++i) {
+      now_ += 50'000;
+      if (imu) counters_.imu_published += 12;
+      if (packets) counters_.pairing.paired += 9;
+      if (imu || packets) counters_.framing.bytes += 5000;
+      report = watch_.look(now_, true, counters_, health);
+    }
+    return report;
   }
-  SensorWatch watch_;
+  SensorReport run_on_garbage(double seconds) {
+    SensorReport report;
+    for (int i = 0; i < seconds * 20; ++i) {
+      now_ += 50'000;
+      counters_.framing.bytes += 1000;
+      report = watch_.look(now_, true, counters_, {});
+    }
+    return report;
+  }
+  SensorWatch watch_{"/dev/ttyUSB7 at 2000000 baud"};
   DecoderCounters counters_;
   Utime now_ = 1'000'000'000;
 };
 
 TEST_F(SensorWatchTest, WaitsThenRuns) {
-  EXPECT_EQ(run(2.0, false, false).state, SensorState::kWaiting);
-  const SensorReport report = run(1.0, true, true);
+  EXPECT_EQ(run(0.5, false, false).severity, Severity::kDegraded);
+  const SensorReport waiting = run(1.0, false, false);
+  EXPECT_EQ(waiting.state, SensorState::kWaiting);
+  EXPECT_EQ(waiting.severity, Severity::kFault);
+  EXPECT_NE(waiting.text.find("/dev/ttyUSB7 at 2000000 baud"), std::string::npos) << waiting.text;
+  const SensorReport report = run(1.2, true, true);
   EXPECT_EQ(report.state, SensorState::kRunning);
-  EXPECT_FALSE(report.degraded);
+  EXPECT_EQ(report.severity, Severity::kOk);
+}
+
+TEST_F(SensorWatchTest, AsksForASecondOfGoodDataAfterTrouble) {
+  (void)run(2.0, true, true);
+  (void)run(0.5, false, true);
+  const SensorReport recovering = run(0.8, true, true);
+  EXPECT_EQ(recovering.severity, Severity::kDegraded);
+  EXPECT_NE(recovering.text.find("no inertial data"), std::string::npos) << recovering.text;
+  EXPECT_EQ(run(0.4, true, true).severity, Severity::kOk);
 }
 
 TEST_F(SensorWatchTest, NoticesAMissingStreamWithin300Milliseconds) {
-  (void)run(1.0, true, true);
+  (void)run(2.0, true, true);
   SensorReport report = run(0.35, true, false);
-  EXPECT_TRUE(report.degraded);
+  EXPECT_EQ(report.severity, Severity::kDegraded);
   EXPECT_EQ(report.state, SensorState::kRunning);
   report = run(1.0, true, false);
   EXPECT_EQ(report.state, SensorState::kStandby);
-  (void)run(1.0, true, true);
+  (void)run(2.0, true, true);
   report = run(0.35, false, true);
-  EXPECT_TRUE(report.degraded);
+  EXPECT_EQ(report.severity, Severity::kDegraded);
   EXPECT_EQ(report.text, "scans come, but no inertial data");
 }
 
-TEST_F(SensorWatchTest, CallsASensorThatStoppedSilent) {
-  (void)run(1.0, true, true);
-  EXPECT_EQ(run(0.5, false, false).state, SensorState::kSilent);
-  EXPECT_FALSE(run(0.5, true, true).degraded);
+TEST_F(SensorWatchTest, CallsASensorThatStoppedSilentAndThenFaulty) {
+  (void)run(2.0, true, true);
+  const SensorReport early = run(0.5, false, false);
+  EXPECT_EQ(early.state, SensorState::kSilent);
+  EXPECT_EQ(early.severity, Severity::kDegraded);
+  EXPECT_EQ(run(1.0, false, false).severity, Severity::kFault);
+}
+
+TEST_F(SensorWatchTest, CallsBytesWithoutFramesAFaultAndTellsHowMany) {
+  const SensorReport report = run_on_garbage(1.5);
+  EXPECT_EQ(report.severity, Severity::kFault);
+  EXPECT_NE(report.text.find("30000 bytes"), std::string::npos) << report.text;
+  EXPECT_NE(report.text.find("wrong speed"), std::string::npos) << report.text;
 }
 
 TEST_F(SensorWatchTest, ReportsFrozenAndImpossibleValues) {
-  EXPECT_TRUE(run(1.0, true, true, {.rejected_in_a_row = 0, .rejected_field = "", .equal_imu_samples = 25}).degraded);
+  (void)run(2.0, true, true);
+  EXPECT_EQ(run(0.05, true, true, {.rejected_in_a_row = 0, .rejected_field = "", .equal_imu_samples = 25}).text,
+            "inertial values are frozen");
   const SensorReport report =
-      run(1.0, true, true, {.rejected_in_a_row = 50, .rejected_field = "theta_angle", .equal_imu_samples = 0});
-  EXPECT_TRUE(report.degraded);
+      run(0.05, true, true, {.rejected_in_a_row = 50, .rejected_field = "theta_angle", .equal_imu_samples = 0});
+  EXPECT_EQ(report.severity, Severity::kFault);
   EXPECT_NE(report.text.find("theta_angle"), std::string::npos);
 }
 
 TEST_F(SensorWatchTest, TellsAClosedPortFromASilentOne) {
-  (void)run(1.0, true, true);
-  EXPECT_EQ(watch_.look(now_, false, counters_, {}).state, SensorState::kDisconnected);
+  (void)run(2.0, true, true);
+  const SensorReport report = watch_.look(now_, false, counters_, {});
+  EXPECT_EQ(report.state, SensorState::kDisconnected);
+  EXPECT_EQ(report.severity, Severity::kFault);
 }
 
 }  // namespace

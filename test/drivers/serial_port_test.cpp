@@ -39,7 +39,7 @@ class SerialPortTest : public ::testing::Test {
   static std::string error_of(const std::filesystem::path& device) {
     try {
       const SerialPort port(device, 2'000'000);
-    } catch (const SerialError& error) {
+    } catch (const LinkError& error) {
       return error.what();
     }
     return "";
@@ -130,7 +130,7 @@ TEST_F(SerialPortTest, NoticesThatTheDeviceIsGone) {
   SerialPort port(device_, 2'000'000);
   hang_up();
   std::array<std::byte, 64> buffer{};
-  EXPECT_THROW((void)port.read(buffer, 1000), SerialError);
+  EXPECT_THROW((void)port.read(buffer, 1000), LinkError);
 }
 
 }  // namespace

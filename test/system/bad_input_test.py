@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-EXECUTABLES = ["l1_driver", "l1_sim", "lio_frontend", "graph_backend", "map_builder", "lio_replay"]
-MISSING_SCENE = {"l1_sim": ["--scene", "none.json"]}
+EXECUTABLES = ["l1_driver", "l1_tool", "l1_sim", "lio_frontend", "graph_backend", "map_builder", "lio_replay"]
+REQUIRED = {"l1_sim": ["--scene", "none.json"], "l1_tool": ["version"]}
 
 
 def refusal(done: subprocess.CompletedProcess, code: int) -> str:
@@ -25,14 +25,14 @@ def refusal(done: subprocess.CompletedProcess, code: int) -> str:
 def test_one_message_names_every_offence_of_a_configuration(name, run_binary, tmp_path: Path) -> None:
     config = tmp_path / "bad.json"
     config.write_text(json.dumps({"frontend": {"voxel_size_m": 0, "iterations": 1.5, "voxel_sice_m": 1}, "odd": {}}))
-    message = refusal(run_binary(name, *MISSING_SCENE.get(name, []), "--config", config), 2)
+    message = refusal(run_binary(name, *REQUIRED.get(name, []), "--config", config), 2)
     for part in ("voxel_size_m = 0", "iterations = 1.5", 'did you mean "voxel_size_m"', "odd", "bad.json"):
         assert part in message
 
 
 @pytest.mark.parametrize("name", EXECUTABLES)
 def test_effective_configuration_is_printed_and_read_back(name, run_binary, tmp_path: Path) -> None:
-    extra = MISSING_SCENE.get(name, [])
+    extra = REQUIRED.get(name, [])
     printed = run_binary(name, *extra, "--print-config")
     assert printed.returncode == 0, printed.stderr
     (tmp_path / "printed.json").write_text(printed.stdout)

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "live_driver.h"
+
+#include <format>
+#include <iostream>
+#include <thread>
+
+#include "runtime/stop_signal.h"
+
+namespace ignis::runtime {
+namespace {
+
+constexpr int kReadTimeoutMs = 50;
+constexpr std::chrono::milliseconds kReconnectPause{200};
+
+}  // namespace
+
+LiveDriver::LiveDriver(const Application& application, const std::string& recording)
+    : driver_(application.config.driver),
+      decoder_(driver_, application.config.extrinsics),
+      bus_(application),
+      publisher_(bus_, decoder_, std::format("{} at {} baud", driver_.port, driver_.baud)),
+      link_(l1::open_link(driver_.port, driver_.baud)) {
+  if (!recording.empty()) recording_.emplace(recording);
+}
+
+ExitCode LiveDriver::run() {
+  std::cout << std::format("l1_driver: reading {}\n", driver_.port) << std::flush;
+  while (!stop_requested()) step();
+  for (const l1::Event& event : decoder_.finish()) publisher_.publish(event);
+  if (!recording_) return kDone;
+  recording_->flush();
+  std::cout << std::format("l1_driver: {}\n", recording_->summary());
+  return recording_->trouble().empty() ? kDone : kFailed;
+}
+
+void LiveDriver::step() {
+  try {
+    if (link_) {
+      exchange();
+    } else {
+      reopen();
+    }
+  } catch (const l1::LinkError& error) {
+    if (link_) std::cerr << std::format("l1_driver: {}, trying again\n", error.what());
+    link_.reset();
+  }
+  report();
+}
+
+void LiveDriver::exchange() {
+  const std::size_t count = link_->read(buffer_, kReadTimeoutMs);
+  const auto bytes = std::span<const std::byte>(buffer_).first(count);
+  if (recording_) recording_->append(bytes);
+  for (const l1::Event& event : decoder_.feed(bytes, host_clock_.now())) publisher_.publish(event);
+  if (const auto answer = decoder_.take_outgoing(); !answer.empty()) link_->write(answer);
+  ask_for_version();
+}
+
+void LiveDriver::reopen() {
+  std::this_thread::sleep_for(kReconnectPause);
+  link_ = l1::open_link(driver_.port, driver_.baud);
+  std::cerr << std::format("l1_driver: {} is back\n", driver_.port);
+}
+
+void LiveDriver::ask_for_version() {
+  const Utime now = steady_now();
+  if (!decoder_.housekeeping().firmware.empty() || now - last_request_ < kMicrosPerSecond) return;
+  last_request_ = now;
+  link_->write(decoder_.version_request());
+}
+
+void LiveDriver::report() {
+  const Utime now = steady_now();
+  if (recording_ && now - last_flush_ >= kMicrosPerSecond) {
+    last_flush_ = now;
+    recording_->flush();
+  }
+  publisher_.report(now, {.connected = link_ != nullptr,
+                          .refused = link_ ? link_->refused() : 0,
+                          .trouble = recording_ ? recording_->trouble() : ""});
+}
+
+}  // namespace ignis::runtime
