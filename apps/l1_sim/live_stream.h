@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <filesystem>
-
-#include "drivers/sim/l1_stream.h"
+#include "drivers/sim/byte_faults.h"
+#include "drivers/sim/host_listener.h"
+#include "host_line.h"
 #include "runtime/application.h"
 
 namespace ignis {
 
-struct LiveOptions {
-  std::filesystem::path link;  ///< name under which the serial port appears
-  double wait_s = 30.0;        ///< [s] patience for a reader
+/// A simulated sensor on its line to the host.
+struct LiveSensor {
+  sim::L1Stream& stream;
+  sim::ByteFaults& faults;
+  sim::HostListener& listener;
+  HostLine& line;
 };
 
-/// Waits for a reader, then sends the stream in real time and the true pose on GROUND_TRUTH. Ends well after the last
-/// byte was taken, or at Ctrl-C.
-[[nodiscard]] runtime::ExitCode run_live(sim::L1Stream& stream, const LiveOptions& options,
-                                         const runtime::Application& application);
+/// Sends the stream in real time, obeys the host, and publishes the true pose on GROUND_TRUTH. Ends well after the last
+/// byte was taken, or at Ctrl-C. Fails at the end when the host sent messages that would have spoilt a real sensor.
+[[nodiscard]] runtime::ExitCode run_live(const LiveSensor& sensor, const runtime::Application& application);
 
 }  // namespace ignis

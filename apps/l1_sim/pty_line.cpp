@@ -13,10 +13,13 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include "descriptor_wait.h"
 #include "runtime/application.h"
 
 namespace ignis {
 namespace {
+
+constexpr std::chrono::milliseconds kPatience{200};
 
 [[noreturn]] void fail(const std::string& what) {
   throw runtime::UserError(std::format("{}: {}", what, std::strerror(errno)), runtime::kFailed);
@@ -81,8 +84,9 @@ bool PtyLine::has_reader() const {
   return poll(&end, 1, 0) == 0;
 }
 
-bool PtyLine::write(std::span<const std::byte> bytes, std::chrono::milliseconds patience) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
+bool PtyLine::write(std::span<const std::byte> bytes) {
+  if (!has_reader()) return false;
+  const auto deadline = Clock::now() + kPatience;
   while (!bytes.empty()) {
     const ssize_t sent = ::write(master_, bytes.data(), bytes.size());
     if (sent > 0) {
@@ -90,8 +94,7 @@ bool PtyLine::write(std::span<const std::byte> bytes, std::chrono::milliseconds 
       continue;
     }
     if (sent < 0 && errno != EAGAIN && errno != EINTR) return false;
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) return false;
     pollfd end{master_, POLLOUT, 0};
     poll(&end, 1, static_cast<int>(left.count()));
@@ -99,10 +102,10 @@ bool PtyLine::write(std::span<const std::byte> bytes, std::chrono::milliseconds 
   return true;
 }
 
-void PtyLine::discard_input() {
-  std::array<char, 512> waste;
-  while (read(master_, waste.data(), waste.size()) > 0) {
-  }
+std::size_t PtyLine::read(std::span<std::byte> buffer, Clock::time_point deadline) {
+  if (!wait_for_input(master_, deadline)) return 0;
+  const ssize_t count = ::read(master_, buffer.data(), buffer.size());
+  return count > 0 ? static_cast<std::size_t>(count) : 0;
 }
 
 }  // namespace ignis

@@ -1,31 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
-#include <cstddef>
 #include <filesystem>
-#include <span>
+
+#include "host_line.h"
 
 namespace ignis {
 
 /// The sensor's end of a pseudo-terminal. Its other end appears under a name of our choice, as a serial port would.
-class PtyLine {
+class PtyLine final : public HostLine {
  public:
   /// Makes the pair and links `link` to the reader's end. A symbolic link of that name is replaced; anything else is an
   /// error. Throws runtime::UserError that says what to do.
   explicit PtyLine(std::filesystem::path link);
-  ~PtyLine();
-  PtyLine(const PtyLine&) = delete;
-  PtyLine& operator=(const PtyLine&) = delete;
+  ~PtyLine() override;
 
   /// True while somebody has the other end open.
-  [[nodiscard]] bool has_reader() const;
+  [[nodiscard]] bool has_reader() const override;
 
-  /// Sends bytes; when the reader does not keep up, waits up to `patience`, then gives the rest up and returns false.
-  bool write(std::span<const std::byte> bytes, std::chrono::milliseconds patience);
+  /// When the reader does not keep up, waits up to 200 ms, then gives the rest up.
+  bool write(std::span<const std::byte> bytes) override;
 
-  /// Throws away what the host sent.
-  void discard_input();
+  [[nodiscard]] std::size_t read(std::span<std::byte> buffer, Clock::time_point deadline) override;
 
  private:
   std::filesystem::path link_;

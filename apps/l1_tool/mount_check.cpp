@@ -15,7 +15,8 @@ namespace ignis {
 namespace {
 
 constexpr double kSamplesPerSecond = 250.0;
-constexpr double kWarnDeg = 1.0;
+/// An accelerometer's bias of 0.1 m/s^2 is 0.6 degrees of tilt, and 0.8 of the roll of a mount that is pitched by 45.
+constexpr double kWarnDeg = 2.0;
 constexpr std::size_t kMostPoints = 200'000;
 /// Nearer returns are the vehicle.
 constexpr double kNearestM = 0.3;
@@ -67,7 +68,7 @@ Observations observe_capture(const std::filesystem::path& file, DriverConfig con
   return seen;
 }
 
-/// One row of the table; false when it is further off than a degree.
+/// One row of the table; false when it is further off than kWarnDeg.
 bool print_tilt(const char* source, const l1::Tilt& found, const Mount& mount) {
   const double pitch_off = std::remainder(found.pitch_deg - mount.pitch_deg, 360.0);
   const double roll_off = std::remainder(found.roll_deg - mount.roll_deg, 360.0);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./ignis sim`: a simulated drive as the sensor's raw bytes, with ground truth and a picture of the scene."""
+"""`./ignis sim`: a simulated drive as the sensor's raw bytes or as a log, with ground truth and a picture."""
 
 import argparse
 import json
@@ -35,7 +35,19 @@ def read_scene(file: Path) -> dict[str, Any]:
         source = json.loads((file.parent / scene["geometry"]).read_text(encoding="utf-8"))
         for kind in _SOLIDS:
             scene[kind] = scene.get(kind, []) + source.get(kind, [])
+    for kind in _SOLIDS:
+        scene[kind] = [copy for solid in scene.get(kind, []) for copy in _copies(solid)]
     return scene
+
+
+def _copies(solid: dict[str, Any]) -> list[dict[str, Any]]:
+    """The solid itself, or all that its repetition makes of it."""
+    if "repeat" not in solid:
+        return [solid]
+    counts = [int(count) for count in solid["repeat"].get("count", [1, 1, 1])]
+    step = np.array(solid["repeat"].get("step_m", [0.0, 0.0, 0.0]))
+    first = np.array(solid.get("center_m", _DEFAULTS["center_m"]))
+    return [solid | {"center_m": list(first + np.array(index) * step)} for index in np.ndindex(*counts)]
 
 
 def _box_corners(box: dict[str, Any]) -> np.ndarray:
@@ -128,18 +140,23 @@ def _default_config() -> Path | None:
     return file if file.is_file() else None
 
 
-def simulate(scene_file: Path, out: Path, seed: int, duration: float | None, config: Path | None) -> int:
-    """Writes capture.bin, ground_truth.tum and scene.png into `out`; returns l1_sim's exit code."""
-    command = [str(_build_folder() / "bin" / "l1_sim"), "--scene", str(scene_file), "--seed", str(seed)]
-    command += ["--config", str(config)] if config else []
-    command += ["--duration", str(duration)] if duration is not None else []
-    command += ["--capture", str(out / "capture.bin"), "--ground-truth", str(out / "ground_truth.tum")]
+def simulate(arguments: argparse.Namespace) -> int:
+    """Writes the bytes or the log, ground_truth.tum and scene.png into the folder; returns l1_sim's exit code."""
+    out: Path = arguments.out
+    command = [str(_build_folder() / "bin" / "l1_sim"), "--scene", str(arguments.scene), "--seed", str(arguments.seed)]
+    command += ["--config", str(arguments.config)] if arguments.config else []
+    command += ["--duration", str(arguments.duration)] if arguments.duration is not None else []
+    names = ["drive.lcm" if arguments.log else "capture.bin", "ground_truth.tum"]
+    command += ["--log" if arguments.log else "--capture", str(out / names[0]), "--ground-truth", str(out / names[1])]
+    if arguments.fault:
+        names.append("faults.csv")
+        command += ["--fault-list", str(out / names[-1]), "--fault-seed", str(arguments.fault_seed)]
+        command += [word for fault in arguments.fault for word in ("--fault", fault)]
     code = subprocess.run(command, check=False).returncode
     if code != 0:
         return code
-    scene = read_scene(scene_file)
-    draw_scene(scene, out / "ground_truth.tum", out / "scene.png", scene_file.stem)
-    for name in ("capture.bin", "ground_truth.tum", "scene.png"):
+    draw_scene(read_scene(arguments.scene), out / "ground_truth.tum", out / "scene.png", arguments.scene.stem)
+    for name in (*names, "scene.png"):
         print(out / name)
     return 0
 
@@ -157,6 +174,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--out", type=Path, required=True, help="folder for capture.bin, ground_truth.tum and scene.png"
     )
+    parser.add_argument("--log", action="store_true", help="write drive.lcm for ./ignis replay instead of capture.bin")
+    parser.add_argument(
+        "--fault",
+        action="append",
+        metavar="FAULT=RATE",
+        help="damage per frame, repeatable: drop, flip, cut, duplicate, stall, reorder, junk; listed in faults.csv",
+    )
+    parser.add_argument("--fault-seed", type=int, default=1, help="seed of the faults (default 1)")
     parser.add_argument("--seed", type=int, default=1, help="seed of all noise (default 1)")
     parser.add_argument("--duration", type=float, help="end after this many seconds of sensor time")
     parser.add_argument("--config", type=Path, default=_default_config(), help="configuration with the sensor's mount")
@@ -166,7 +191,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not parsed.scene.is_file():
             raise InputError(f"there is no scene file {parsed.scene}; the shipped ones are in config/scenes")
         _make_folder(parsed.out)
-        code = simulate(parsed.scene, parsed.out, parsed.seed, parsed.duration, parsed.config)
+        code = simulate(parsed)
         # A process ended by a signal has a negative code; those of l1_sim have our meaning already.
         return EXIT_INTERRUPTED if code < 0 else (code if code in (0, EXIT_FAILURE, EXIT_BAD_INPUT) else EXIT_FAILURE)
 

@@ -6,11 +6,20 @@
 
 namespace ignis::l1 {
 
+namespace {
+
+/// A step back by so few, at once, is a frame that others have overtaken: no counter wraps that early, and no sensor
+/// restarts that fast.
+constexpr int kMostOvertaken = 8;
+
+}  // namespace
+
 std::int64_t CounterUnwrapper::advance(std::uint16_t id, double elapsed_us, double slack_us) {
   if (!last_id_) count_ = id;
   const int difference = last_id_ ? static_cast<int>(id) - static_cast<int>(*last_id_) : 0;
-  last_id_ = id;
   guessed_ = false;
+  if (difference < 0 && difference >= -kMostOvertaken && elapsed_us < kMostOvertaken * period_us_) return 0;
+  last_id_ = id;
   if (difference == 0) return 0;
   const std::int64_t step = step_from(difference, elapsed_us, slack_us);
   count_ += step;

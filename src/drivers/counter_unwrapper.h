@@ -13,7 +13,8 @@ class CounterUnwrapper {
  public:
   explicit CounterUnwrapper(double period_us) : period_us_(period_us) {}
 
-  /// Steps from the previous id to this one; 0 for a repeated id, also for the very first one.
+  /// Steps from the previous id to this one; 0 for a repeated id, for one that others have overtaken, and for
+  /// the very first one.
   /// `elapsed_us`: about how much time passed since the previous id. `slack_us`: how far that may be too short.
   [[nodiscard]] std::int64_t advance(std::uint16_t id, double elapsed_us, double slack_us);
 

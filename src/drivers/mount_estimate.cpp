@@ -24,7 +24,7 @@ constexpr double kGravity = 9.81;
 constexpr double kGravityBand = 0.7;
 constexpr double kRestGyroMean = 0.05;   // rad/s
 constexpr double kRestGyroSigma = 0.1;   // rad/s
-constexpr double kRestAccelSigma = 0.8;  // m/s^2
+constexpr double kRestAccelSigma = 1.5;  // m/s^2; the rotor shakes the housing
 constexpr double kWrongAxesDeg = 60.0;
 
 /// Points n . p = offset of the candidate plane.

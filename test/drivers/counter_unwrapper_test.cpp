@@ -28,6 +28,16 @@ TEST(CounterUnwrapper, FollowsAnyModulus) {
   }
 }
 
+TEST(CounterUnwrapper, PassesOverAFrameThatOthersHaveOvertaken) {
+  CounterUnwrapper counter(kPeriod);
+  (void)counter.advance(10, 0.0, kSlack);
+  (void)counter.advance(12, 2 * kPeriod, kSlack);
+  EXPECT_EQ(counter.advance(11, 0.1 * kPeriod, kSlack), 0);
+  EXPECT_EQ(counter.count(), 12);
+  EXPECT_EQ(counter.advance(13, kPeriod, kSlack), 1);
+  EXPECT_EQ(counter.advance(20, 7 * kPeriod, kSlack), 7);
+}
+
 TEST(CounterUnwrapper, UsesTheModulusItHasSeenForALossAcrossAWrap) {
   CounterUnwrapper counter(kPeriod);
   for (int i = 0; i < 1025; ++i) (void)counter.advance(static_cast<std::uint16_t>(i % 1024), kPeriod, kSlack);

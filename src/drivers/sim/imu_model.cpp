@@ -4,6 +4,13 @@
 #include <cmath>
 
 namespace ignis::sim {
+namespace {
+
+Eigen::Vector3d clipped(const Eigen::Vector3d& v, double limit) {
+  return limit > 0.0 ? Eigen::Vector3d(v.cwiseMin(limit).cwiseMax(-limit)) : v;
+}
+
+}  // namespace
 
 ImuReading ideal_imu(const Motion& motion, const Pose& T_body_imu) {
   const Eigen::Vector3d& lever = T_body_imu.translation;
@@ -16,7 +23,11 @@ ImuReading ideal_imu(const Motion& motion, const Pose& T_body_imu) {
 }
 
 ImuModel::ImuModel(const ImuModelConfig& config, const Pose& T_body_imu, double period_s, std::uint64_t seed)
-    : config_(config), T_body_imu_(T_body_imu), period_s_(period_s), random_(seed) {
+    : config_(config),
+      T_body_imu_(T_body_imu),
+      period_s_(period_s),
+      random_(seed),
+      disturbance_(config.disturbance, seed) {
   gyro_bias_ = config_.gyro_bias * normal_vector(1.0).normalized();
   accel_bias_ = config_.accel_bias * normal_vector(1.0).normalized();
 }
@@ -24,12 +35,17 @@ ImuModel::ImuModel(const ImuModelConfig& config, const Pose& T_body_imu, double 
 ImuReading ImuModel::sample(const Motion& motion) {
   ImuReading reading = ideal_imu(motion, T_body_imu_);
   const double root_rate = 1.0 / std::sqrt(period_s_);
-  reading.gyro += gyro_bias_ + normal_vector(config_.gyro_noise * root_rate);
-  reading.accel += accel_bias_ + normal_vector(config_.accel_noise * root_rate);
+  reading.gyro += gyro_bias() + normal_vector(config_.gyro_noise * root_rate);
+  reading.accel += accel_bias() + normal_vector(config_.accel_noise * root_rate);
   gyro_bias_ += normal_vector(config_.gyro_bias_walk * std::sqrt(period_s_));
   accel_bias_ += normal_vector(config_.accel_bias_walk * std::sqrt(period_s_));
-  return reading;
+  reading += disturbance_.shaking(next_t());
+  ++sample_count_;
+  return {clipped(reading.gyro, config_.gyro_limit), clipped(reading.accel, config_.accel_limit)};
 }
+
+Eigen::Vector3d ImuModel::gyro_bias() const { return gyro_bias_ + disturbance_.drift(next_t()).gyro; }
+Eigen::Vector3d ImuModel::accel_bias() const { return accel_bias_ + disturbance_.drift(next_t()).accel; }
 
 Eigen::Vector3d ImuModel::normal_vector(double sigma) {
   // One statement each: the order of evaluation inside an initialiser must not decide the random sequence.

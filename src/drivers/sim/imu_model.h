@@ -6,6 +6,8 @@
 
 #include "common/config_fields.h"
 #include "common/pose.h"
+#include "drivers/sim/imu_disturbance.h"
+#include "drivers/sim/imu_reading.h"
 #include "drivers/sim/trajectory.h"
 
 namespace ignis::sim {
@@ -20,6 +22,9 @@ struct ImuModelConfig {
   double accel_bias = 0.1;
   double gyro_bias_walk = 1e-5;
   double accel_bias_walk = 1e-4;
+  double gyro_limit = 0.0;
+  double accel_limit = 0.0;
+  ImuDisturbanceConfig disturbance = {};
 
   void visit_fields(this auto& self, auto& visit) {
     visit.number("gyro_noise", self.gyro_noise, {0.0, 1.0}, "rad/s/sqrt(Hz)", "white noise density of the gyro");
@@ -32,20 +37,18 @@ struct ImuModelConfig {
     visit.number("gyro_bias_walk", self.gyro_bias_walk, {0.0, 1.0}, "rad/s^2/sqrt(Hz)", "random walk of the gyro bias");
     visit.number("accel_bias_walk", self.accel_bias_walk, {0.0, 1.0}, "m/s^3/sqrt(Hz)",
                  "random walk of the accelerometer bias");
+    visit.number("gyro_limit", self.gyro_limit, {0.0, 1000.0}, "rad/s", "full scale of each gyro axis; 0: none");
+    visit.number("accel_limit", self.accel_limit, {0.0, 10000.0}, "m/s^2",
+                 "full scale of each accelerometer axis; 0: none");
+    self.disturbance.visit_fields(visit);
   }
-};
-
-/// Angular rate [rad/s] and specific force [m/s^2] in the axes of the inertial unit.
-struct ImuReading {
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
 };
 
 /// What a perfect unit mounted at T_body_imu reads: rigid-body acceleration at its own position (with the centripetal
 /// and the angular-acceleration term of the lever arm) minus gravity.
 [[nodiscard]] ImuReading ideal_imu(const Motion& motion, const Pose& T_body_imu);
 
-/// Adds bias, bias walk and white noise, all from one seed.
+/// Adds bias, bias walk, drift, white noise, vibration and shocks, all from one seed, and clips at full scale.
 class ImuModel {
  public:
   ImuModel(const ImuModelConfig& config, const Pose& T_body_imu, double period_s, std::uint64_t seed);
@@ -53,11 +56,13 @@ class ImuModel {
   /// The next sample, one period after the one before.
   [[nodiscard]] ImuReading sample(const Motion& motion);
 
-  [[nodiscard]] const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }    ///< [rad/s] unit's axes
-  [[nodiscard]] const Eigen::Vector3d& accel_bias() const { return accel_bias_; }  ///< [m/s^2] unit's axes
+  /// True biases of the next sample, drift included, in the unit's axes.
+  [[nodiscard]] Eigen::Vector3d gyro_bias() const;   ///< [rad/s]
+  [[nodiscard]] Eigen::Vector3d accel_bias() const;  ///< [m/s^2]
 
  private:
   [[nodiscard]] Eigen::Vector3d normal_vector(double sigma);
+  [[nodiscard]] double next_t() const { return static_cast<double>(sample_count_) * period_s_; }
 
   ImuModelConfig config_;
   Pose T_body_imu_;
@@ -66,6 +71,8 @@ class ImuModel {
   std::normal_distribution<double> normal_;
   Eigen::Vector3d gyro_bias_;
   Eigen::Vector3d accel_bias_;
+  ImuDisturbance disturbance_;
+  std::int64_t sample_count_ = 0;
 };
 
 }  // namespace ignis::sim

@@ -3,39 +3,34 @@
 
 #include <vector>
 
-#include "drivers/sim/solids.h"
+#include "drivers/sim/mover.h"
+#include "drivers/sim/ray_kernel.h"
 
 namespace ignis::sim {
 
-/// All geometry of a scene, ready for casting: a bounding volume tree over the solids, and a short list of unbounded
-/// planes. World frame, metres. Immutable after construction, so any number of threads may cast.
+/// All geometry of a scene, ready for casting: solids and meshes in a bounding volume hierarchy, a short list of
+/// unbounded planes, and what moves. World frame, metres. Immutable after construction, so any number of threads may
+/// cast.
 class RayScene {
  public:
-  RayScene(std::vector<Plane> planes, std::vector<Solid> solids);
+  RayScene(std::vector<Plane> planes, std::vector<Solid> solids, std::vector<TriangleMesh> meshes = {},
+           std::vector<Mover> movers = {});
 
-  /// Nearest surface along the ray, nearer than `limit` [m].
-  [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double limit) const;
+  /// Nearest surface along the ray, nearer than `limit` [m], with what moves where it is at `time` [s].
+  [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double limit, double time = 0.0) const;
 
-  /// Distance from a point to the nearest surface [m], negative inside a solid.
-  [[nodiscard]] double clearance(const Eigen::Vector3d& point) const;
+  /// Distance from a point to the nearest surface [m], negative inside a solid. Meshes have no inside.
+  [[nodiscard]] double clearance(const Eigen::Vector3d& point, double time = 0.0) const;
 
   [[nodiscard]] const std::vector<Plane>& planes() const { return planes_; }
-  [[nodiscard]] const std::vector<Solid>& solids() const { return solids_; }
+  [[nodiscard]] const std::vector<Solid>& solids() const { return kernel_.solids(); }
+  [[nodiscard]] const std::vector<TriangleMesh>& meshes() const { return kernel_.meshes(); }
+  [[nodiscard]] const std::vector<Mover>& movers() const { return movers_; }
 
  private:
-  /// A leaf holds `count` solids from `first`; an inner node (count 0) has its children at the next index and at
-  /// `first`.
-  struct Node {
-    Eigen::AlignedBox3d box;
-    int first = 0;
-    int count = 0;
-  };
-
-  int build(int begin, int end);
-
   std::vector<Plane> planes_;
-  std::vector<Solid> solids_;
-  std::vector<Node> nodes_;
+  RayKernel kernel_;
+  std::vector<Mover> movers_;
 };
 
 }  // namespace ignis::sim

@@ -1,46 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/sim/imu_model.h"
 
-#include <gtest/gtest.h>
+#include <cmath>
+#include <vector>
 
-#include "common/so3.h"
+#include <gtest/gtest.h>
 
 namespace ignis::sim {
 namespace {
-
-TrajectoryConfig bend() {
-  TrajectoryConfig config;
-  config.corner_m = 2.0;
-  config.tilt_deg = 1.0;
-  config.waypoints = {{.position_m = {0, 0.6, 0}, .rest_s = 2.0},
-                      {.position_m = {0, 0.6, -10}},
-                      {.position_m = {8, 1.5, -10}},
-                      {.position_m = {8, 1.5, -20}, .rest_s = 1.0}};
-  return config;
-}
-
-Pose tilted_mount() { return {so3::exp({-0.7, 0.2, 0.4}), {0.3, -0.2, 0.5}}; }
-
-TEST(IdealImu, IntegratesBackToTheTrajectoryOfItsOwnMount) {
-  const Trajectory drive(bend());
-  const Pose T_body_imu = tilted_mount();
-  constexpr double kStep = 1e-3;
-  Pose T_world_imu = drive.at(0.0).T_world_body * T_body_imu;
-  Eigen::Vector3d v_world = Eigen::Vector3d::Zero();
-  const int steps = static_cast<int>(drive.duration() / kStep);
-  for (int i = 0; i < steps; ++i) {
-    const ImuReading reading = ideal_imu(drive.at((i + 0.5) * kStep), T_body_imu);
-    const Eigen::Quaterniond q_middle = T_world_imu.rotation * so3::exp(reading.gyro * (0.5 * kStep));
-    const Eigen::Vector3d a_world = q_middle * reading.accel - Eigen::Vector3d(0.0, kGravity, 0.0);
-    T_world_imu.translation += v_world * kStep + a_world * (0.5 * kStep * kStep);
-    v_world += a_world * kStep;
-    T_world_imu.rotation = (T_world_imu.rotation * so3::exp(reading.gyro * kStep)).normalized();
-  }
-  const Pose truth = drive.at(steps * kStep).T_world_body * T_body_imu;
-  // The midpoint rule's own error over 25 s at 1 kHz.
-  EXPECT_LT((T_world_imu.translation - truth.translation).norm(), 1e-3);
-  EXPECT_LT(so3::log(truth.rotation.conjugate() * T_world_imu.rotation).norm(), 1e-5);
-}
 
 TEST(IdealImu, FeelsGravityUpwardAtRest) {
   const ImuReading reading = ideal_imu(Motion{}, Pose{});
@@ -89,6 +56,33 @@ TEST(ImuModel, WalksItsBiasesAsARandomWalk) {
   const double root_time = std::sqrt(2.0);
   EXPECT_NEAR(std::sqrt(gyro_square / kRuns), config.gyro_bias_walk * root_time, 0.15e-3);
   EXPECT_NEAR(std::sqrt(accel_square / kRuns), config.accel_bias_walk * root_time, 0.15e-2);
+}
+
+/// The overlapping Allan deviation of one axis at an averaging time of `window` samples (IEEE Std 952, annex C).
+double allan_deviation(const std::vector<double>& rates, std::size_t window, double period) {
+  std::vector<double> angle{0.0};
+  for (const double rate : rates) angle.push_back(angle.back() + rate * period);
+  const double tau = static_cast<double>(window) * period;
+  double sum = 0.0;
+  const std::size_t count = angle.size() - 2 * window;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double step = angle[k + 2 * window] - 2.0 * angle[k + window] + angle[k];
+    sum += step * step;
+  }
+  return std::sqrt(sum / (2.0 * tau * tau * static_cast<double>(count)));
+}
+
+TEST(ImuModel, ShowsWhiteNoiseAndRandomWalkInItsAllanDeviation) {
+  constexpr double kPeriod = 0.004;
+  ImuModelConfig config{.gyro_noise = 0.002, .gyro_bias = 0.0, .gyro_bias_walk = 0.002};
+  ImuModel model(config, Pose{}, kPeriod, 8);
+  std::vector<double> rates;
+  for (int i = 0; i < 250000; ++i) rates.push_back(model.sample(Motion{}).gyro.x());
+  // White noise: N / sqrt(tau), slope -1/2. Random walk: K sqrt(tau / 3), slope +1/2. Each where the other is small.
+  EXPECT_NEAR(allan_deviation(rates, 5, kPeriod), config.gyro_noise / std::sqrt(0.02), 0.05 * 0.0141);
+  EXPECT_NEAR(allan_deviation(rates, 50, kPeriod), std::hypot(0.002 / std::sqrt(0.2), 0.002 * std::sqrt(0.2 / 3.0)),
+              0.05 * 0.0045);
+  EXPECT_NEAR(allan_deviation(rates, 5000, kPeriod), config.gyro_bias_walk * std::sqrt(20.0 / 3.0), 0.25 * 0.0052);
 }
 
 }  // namespace

@@ -1,39 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/sim/scene_config.h"
 
-#include <fstream>
-
 #include <gtest/gtest.h>
 
-#include "common/config_check.h"
+#include "drivers/sim/scene_files.h"
 
 namespace ignis::sim {
 namespace {
 
-class SceneFiles : public ::testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("ignis_scene_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::filesystem::path write(const std::string& name, const std::string& text) {
-    std::ofstream(folder_ / name) << text;
-    return folder_ / name;
-  }
-  static std::string error_of(const std::filesystem::path& file) {
-    try {
-      (void)load_scene(file);
-    } catch (const config::ConfigError& error) {
-      return error.what();
-    }
-    return "";
-  }
-
-  std::filesystem::path folder_;
-};
+using SceneFiles = test::SceneFolder;
 
 TEST_F(SceneFiles, NameEveryOffenceAndTheFile) {
   const std::string error = error_of(write("bad.json", R"({"boxes": [{"size_m": [0, 1, 1], "colour": "red"}],
@@ -61,6 +36,40 @@ TEST_F(SceneFiles, TakeGeometryOverFromTheFileTheyName) {
 TEST_F(SceneFiles, RefuseGeometryOfGeometry) {
   write("a.json", R"({"geometry": "b.json"})");
   EXPECT_NE(error_of(write("c.json", R"({"geometry": "a.json"})")).find("b.json"), std::string::npos);
+}
+
+TEST_F(SceneFiles, RefuseRepetitionsThatCannotBeMeant) {
+  const std::string error = error_of(write("bad.json", R"({"boxes": [
+      {"repeat": {"count": [2.5, 1, 1], "step_m": [1, 0, 0]}}, {"repeat": {"count": [1, 3, 1]}},
+      {"repeat": {"count": [1000, 1000, 1], "step_m": [1, 1, 0]}}, {"repeat": {"count": [0, 1, 1]}}]})"));
+  for (const char* expected : {"boxes[0].repeat.count", "boxes[1].repeat.step_m[1]", "boxes[2].repeat.count",
+                               "100000 copies", "boxes[3].repeat.count"}) {
+    EXPECT_NE(error.find(expected), std::string::npos) << expected << " in: " << error;
+  }
+}
+
+TEST_F(SceneFiles, RefuseMoversThatCannotMove) {
+  const std::string error = error_of(write("bad.json", R"({"movers": [
+      {"boxes": [{}]}, {"waypoints": [{}]}, {"boxes": [{}], "waypoints": [{}, {}]},
+      {"boxes": [{}], "waypoints": [{}, {"position_m": [1, 0, 0]}, {}]}]})"));
+  for (const char* expected : {"movers[0].waypoints", "movers[1] = no solids", "movers[2].waypoints[1].position_m",
+                               "movers[3].waypoints[0].position_m"}) {
+    EXPECT_NE(error.find(expected), std::string::npos) << expected << " in: " << error;
+  }
+}
+
+TEST(MakeRayScene, RepeatsSolidsAtTheirSteps) {
+  SceneConfig config;
+  config.boxes.push_back(
+      {.center_m = {0, 5, 0}, .size_m = {0.2, 0.2, 0.2}, .repeat = {.count = {3, 1, 2}, .step_m = {2, 0, -4}}});
+  config.cylinders.push_back(
+      {.center_m = {0, -5, 0}, .radius_m = 0.1, .length_m = 0.2, .repeat = {.count = {1, 2, 1}, .step_m = {0, -3, 0}}});
+  const RayScene scene = make_ray_scene(config);
+  EXPECT_EQ(scene.solids().size(), 8U);
+  for (const Eigen::Vector3d& inside : std::vector<Eigen::Vector3d>{
+           {0, 5, 0}, {2, 5, 0}, {4, 5, 0}, {0, 5, -4}, {2, 5, -4}, {4, 5, -4}, {0, -5, 0}, {0, -8, 0}}) {
+    EXPECT_NEAR(scene.clearance(inside), -0.1, 1e-12) << inside.transpose();
+  }
 }
 
 TEST(MakeRayScene, LaysCylindersAlongTheirAxis) {

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace ignis::sim::test {
+
+inline std::filesystem::path scene_folder() { return std::filesystem::path(IGNIS_CONFIG_DIR) / "scenes"; }
+
+/// File names of every scene that is shipped, in alphabetical order.
+inline std::vector<std::string> shipped_scenes() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(scene_folder())) {
+    if (entry.path().extension() == ".json") names.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+/// Name of the test of a scene.
+inline constexpr auto kSceneName = [](const auto& scene) { return std::filesystem::path(scene.param).stem().string(); };
+
+}  // namespace ignis::sim::test
