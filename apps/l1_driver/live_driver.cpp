@@ -20,9 +20,8 @@ LiveDriver::LiveDriver(const Application& application, const std::string& record
       decoder_(driver_, application.config.extrinsics),
       bus_(application),
       publisher_(bus_, decoder_, std::format("{} at {} baud", driver_.port, driver_.baud)),
-      link_(l1::open_link(driver_.port, driver_.baud)) {
-  if (!recording.empty()) recording_.emplace(recording);
-}
+      recording_(recording.empty() ? std::nullopt : std::optional<RawRecording>(recording)),
+      link_(l1::open_link(driver_.port, driver_.baud)) {}
 
 ExitCode LiveDriver::run() {
   std::cout << std::format("l1_driver: reading {}\n", driver_.port) << std::flush;

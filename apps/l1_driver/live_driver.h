@@ -15,7 +15,8 @@ namespace ignis::runtime {
 /// The sensor on its link: reads, publishes, answers, and opens the link again when it was lost.
 class LiveDriver {
  public:
-  /// `recording`: file for the raw bytes; empty: none. Throws l1::LinkError when the link cannot be opened.
+  /// `recording`: file for the raw bytes; empty: none. Throws UserError when that cannot be made, and
+  /// l1::LinkError when the link cannot be opened.
   LiveDriver(const Application& application, const std::string& recording);
 
   /// Until a stop is asked for.
@@ -33,8 +34,8 @@ class LiveDriver {
   LcmLink bus_;
   DriverPublisher publisher_;
   HostClock host_clock_;
-  std::unique_ptr<l1::ByteLink> link_;
   std::optional<RawRecording> recording_;
+  std::unique_ptr<l1::ByteLink> link_;
   std::array<std::byte, 4096> buffer_{};
   Utime last_request_ = 0;
   Utime last_flush_ = 0;

@@ -63,8 +63,8 @@ class Bench:
         self._log = folder / "bus.lcmlog"
         self.pipeline.start("lcm-logger", "--quiet", self._log)
 
-    def start_driver(self, port: object) -> None:
-        self.pipeline.start("l1_driver", "--config", CONFIG, "--port", port)
+    def start_driver(self, port: object, *arguments: object) -> None:
+        self.pipeline.start("l1_driver", "--config", CONFIG, "--port", port, *arguments)
         self.pipeline.wait_for_text("l1_driver", "reading", 20.0)
 
     def start_sensor(self, *arguments: object) -> None:
@@ -316,3 +316,21 @@ def test_power_cycle_and_early_wrap_are_survived(bench: Bench) -> None:
     assert np.abs(errors).max() < 20_000
     _assert_stamps_increase(samples)
     _assert_stamps_increase(recording.scans())
+
+
+def test_raw_recording_decodes_to_what_was_published(bench: Bench, run_binary: Callable[..., Any]) -> None:
+    raw, log = bench.folder / "raw.bin", bench.folder / "decoded.lcmlog"
+    bench.start_sensor("--duration", 6)
+    bench.start_driver(bench.port, "--record", raw)
+    bench.wait_for_end_of_sensor()
+    recording = bench.recording()
+
+    assert (
+        run_binary("l1_driver", "--capture", raw, "--config", CONFIG, "--lcm-url", f"file://{log}?mode=w").returncode
+        == 0
+    )
+    again = Recording(log)
+    forces = [tuple(message.accel) for message in again.messages("L1_IMU")]
+    assert len(forces) > 1400
+    assert forces == [tuple(message.accel) for message in recording.messages("L1_IMU")]
+    assert "exists already" in run_binary("l1_driver", "--port", bench.port, "--record", raw).stderr

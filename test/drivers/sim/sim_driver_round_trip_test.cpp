@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "drivers/l1_decoder.h"
+#include "drivers/scan_geometry.h"
 #include "drivers/sim/l1_stream.h"
+#include "drivers/sim/shipped_scenes.h"
 
 namespace ignis::sim {
 namespace {
@@ -62,6 +64,46 @@ TEST(SimulatedBytes, DecodeToTheWorldAndTheMotionThatWereSimulated) {
   EXPECT_LT(worst_force, kForceTolerance);
   EXPECT_EQ(decoder.counters().scan_gaps + decoder.counters().imu_gaps + decoder.counters().rejected_values, 0);
 }
+
+class RoundTrip : public ::testing::TestWithParam<std::string> {};
+
+/// Encoded, decoded, and put where the vehicle truly was at each point's instant: every return must lie on a surface.
+TEST_P(RoundTrip, PutsEveryReturnOnASurfaceWithinOneStepOfTheRangeGrid) {
+  SceneConfig scene = load_scene(test::scene_folder() / GetParam());
+  scene.lidar.range_noise_m = 0.0;
+  const RayScene geometry = make_ray_scene(scene);
+  constexpr double kSeconds = 20.0;
+  L1Stream stream(scene, l1_extrinsics(), 1, kSeconds);
+  DriverConfig config;
+  config.time_source = "counters";
+  const Pose T_body_lidar = l1_extrinsics().lidar.T_body_sensor();
+  const double step = scene.lidar.range_grid_mm * 1e-3;
+
+  l1::PacketStream packets(config);
+  std::optional<std::int64_t> first;
+  std::int64_t points = 0;
+  double worst = 0.0;
+  while (const auto frame = stream.next_frame()) {
+    for (const l1::Packet& packet : packets.feed(frame->bytes, 0)) {
+      const auto* pair = std::get_if<l1::CountedPacket>(&packet);
+      if (pair == nullptr) continue;
+      if (!first) first = pair->count;
+      const double scan_us = static_cast<double>(pair->count - *first) * l1::kScanPeriodUs;
+      for (const l1::SensorPoint& point : l1::points_of(pair->pair, config)) {
+        const Utime utime = std::llround(scan_us + point.index * l1::kPointPeriodUs);
+        const Pose T_world_lidar = stream.truth_at(utime).T_world_body * T_body_lidar;
+        const double distance = geometry.clearance(T_world_lidar * point.position, static_cast<double>(utime) * 1e-6);
+        worst = std::max(worst, std::abs(distance));
+        ++points;
+      }
+    }
+  }
+  EXPECT_GT(points, 10000);
+  EXPECT_LT(worst, step);
+  EXPECT_EQ(packets.counters().scan_gaps + packets.counters().imu_gaps + packets.counters().rejected_values, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllScenes, RoundTrip, ::testing::ValuesIn(test::shipped_scenes()), test::kSceneName);
 
 }  // namespace
 }  // namespace ignis::sim
