@@ -76,7 +76,7 @@ std::vector<ImuAttitude> at_rest(const Eigen::Vector3d& accel, const Eigen::Vect
     for (int i = 0; i < 3; ++i) {
       const auto axis = static_cast<std::size_t>(i);
       sample.accel[axis] = static_cast<float>(accel[i]) + noise(random);
-      sample.gyro[axis] = static_cast<float>(gyro[i]) + 0.1F * noise(random);
+      sample.gyro[axis] = static_cast<float>(gyro[i]) + 0.02F * noise(random);
     }
   }
   return samples;
@@ -92,7 +92,7 @@ TEST(RestingImu, MeansAndSpreadsAreThoseOfTheSamples) {
   EXPECT_EQ(imu.samples, 500);
   EXPECT_NEAR((imu.mean_accel - Eigen::Vector3d(1.0, 2.0, 9.0)).norm(), 0.0, 0.01);
   EXPECT_NEAR(imu.sigma_accel.x(), 0.05, 0.006);
-  EXPECT_NEAR(imu.sigma_gyro.y(), 0.005, 0.0006);
+  EXPECT_NEAR(imu.sigma_gyro.y(), 0.001, 0.00012);
 }
 
 TEST(Suspicions, NameTheMistake) {
