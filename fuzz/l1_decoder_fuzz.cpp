@@ -1,75 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Framing and decoding of the L1's bytes under a coverage-guided fuzzer. The first byte of an input chooses how the
-// rest is used: as the raw stream, or as a list of payloads that get valid headers and checksums, since nothing behind
-// the checksum is ever reached by chance. Whatever comes in, what goes out must be finite, within the sensor's range,
+// The whole driver core under a coverage-guided fuzzer, from the L1's bytes to samples and scans. The first byte of an
+// input chooses how the rest is used. Whatever comes in, what goes out must be finite, within the sensor's range,
 // strictly ordered in time, and counted.
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 
 #include "drivers/l1_decoder.h"
+#include "l1_input.h"
 
 namespace {
 
 using namespace ignis;
-
-/// Takes the input apart.
-class Input {
- public:
-  explicit Input(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  [[nodiscard]] bool empty() const { return bytes_.empty(); }
-  std::uint8_t byte() {
-    const auto taken = take(1);
-    return taken.empty() ? std::uint8_t{0} : std::to_integer<std::uint8_t>(taken.front());
-  }
-  std::span<const std::byte> take(std::size_t count) {
-    const auto taken = bytes_.first(std::min(count, bytes_.size()));
-    bytes_ = bytes_.subspan(taken.size());
-    return taken;
-  }
-
- private:
-  std::span<const std::byte> bytes_;
-};
-
-constexpr std::uint32_t kIds[] = {l1::kAuxiliaryId, l1::kDistanceId,  l1::kImuId,      l1::kTimeSyncId,
-                                  l1::kVersionId,   l1::kAuxiliaryId, l1::kDistanceId, 122};
-
-/// A frame with a valid checksum around bytes of the input. Half of the packets are made plausible, so that pairs form.
-std::vector<std::byte> framed(Input& input) {
-  const std::uint8_t choice = input.byte();
-  const std::uint32_t id = kIds[choice % std::size(kIds)];
-  const std::size_t full = l1::message_info(id)->length;
-  const auto body = input.take(1 + input.byte() % full);
-  l1::Payload payload(body.begin(), body.end());
-  if (choice & 0x80U) {
-    const std::uint8_t packet = input.byte();
-    if (id == l1::kAuxiliaryId) {
-      l1::Auxiliary auxiliary = l1::decode_auxiliary(payload);
-      auxiliary.packet_id = packet;
-      auxiliary.payload_size = 120;
-      payload = l1::encode(auxiliary);
-    } else if (id == l1::kDistanceId) {
-      l1::Distance distance = l1::decode_distance(payload);
-      distance.packet_id = packet;
-      distance.payload_size = 240;
-      payload = l1::encode(distance);
-    }
-  }
-  return l1::encode_frame(id, payload, choice);
-}
+using fuzz::require;
 
 DriverConfig config_with(const char* time_source) {
   DriverConfig config;
   config.time_source = time_source;
   return config;
-}
-
-/// Ends the program when the decoder broke its word.
-void require(bool promise) {
-  if (!promise) std::abort();
 }
 
 class Judge {
@@ -113,7 +62,7 @@ class Judge {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  Input input(std::as_bytes(std::span(data, size)));
+  fuzz::Input input(std::as_bytes(std::span(data, size)));
   const std::uint8_t mode = input.byte();
   static const Extrinsics extrinsics = l1_extrinsics();
   static const DriverConfig by_arrival = config_with("arrival");
@@ -126,11 +75,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Judge judge(counters_only ? by_counters : by_arrival, extrinsics);
   Utime arrival = 1'000'000'000;
   while (!input.empty()) {
-    const bool as_frame = (mode & 2U) != 0;
-    const auto raw = as_frame ? std::span<const std::byte>{} : input.take(1 + input.byte());
-    const auto frame = as_frame ? framed(input) : std::vector<std::byte>{};
+    const auto bytes = fuzz::next_read(input, (mode & 2U) != 0);
     arrival += (mode & 4U) != 0 ? 4'000 * input.byte() : 2'000;
-    for (const l1::Event& event : decoder.feed(as_frame ? std::span(frame) : raw, arrival)) judge.look_at(event);
+    for (const l1::Event& event : decoder.feed(bytes, arrival)) judge.look_at(event);
   }
   for (const l1::Event& event : decoder.finish()) judge.look_at(event);
   (void)decoder.take_outgoing();
