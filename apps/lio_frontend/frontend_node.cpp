@@ -15,9 +15,6 @@ namespace channels = runtime::channels;
 constexpr int kPollMs = 100;
 constexpr std::size_t kKeyframesKept = 400;
 constexpr int kKeyframeRequestQueue = 100;
-// 20 scans a second: five in a row without a correction are worth telling, two seconds are not to be trusted.
-constexpr int kDegradedAfterScans = 5;
-constexpr int kLostAfterScans = 40;
 
 /// Calls `work` and returns its result with the wall time it took [ms].
 template <class Work>
@@ -72,9 +69,6 @@ void FrontendNode::publish_scan(const ScanResult& scan, double milliseconds) {
   stats.time_spent_ms = milliseconds;
   link_.publish(channels::kScanStats, stats);
   if (!scan.has_state) return;
-  scans_since_applied_ = scan.stats.applied() ? 0 : scans_since_applied_ + 1;
-  last_reason_ = text(scan.stats.reason);
-
   publish_state(scan.state, &scan.covariance);
   messages::PosedCloud cloud{.utime = scan.state.utime,
                              .sequence = cloud_sequence_++,
@@ -102,17 +96,10 @@ void FrontendNode::on_request(const keyframe_request_t& request) {
 
 void FrontendNode::publish_health() {
   const LioStatus status = lio_.status();
-  if (!status.running) {
-    link_.report_health(newest_utime_, health_t::DEGRADED, status.text, lio_.session());
-  } else if (scans_since_applied_ >= kLostAfterScans) {
-    link_.report_health(newest_utime_, health_t::LOST, std::format("no scan applied: {}", last_reason_),
-                        lio_.session());
-  } else if (scans_since_applied_ >= kDegradedAfterScans) {
-    link_.report_health(newest_utime_, health_t::DEGRADED, std::format("no scan applied: {}", last_reason_),
-                        lio_.session());
-  } else {
-    link_.report_health(newest_utime_, health_t::OK, "OK", lio_.session());
-  }
+  static_assert(static_cast<int>(Trust::kOk) == health_t::OK &&
+                static_cast<int>(Trust::kDegraded) == health_t::DEGRADED &&
+                static_cast<int>(Trust::kLost) == health_t::LOST);
+  link_.report_health(newest_utime_, static_cast<std::int8_t>(status.trust), status.reason, lio_.session());
 }
 
 }  // namespace ignis

@@ -39,8 +39,6 @@ class FrontendNode {
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;
   std::int32_t cloud_sequence_ = 0;
-  int scans_since_applied_ = 0;
-  std::string last_reason_;
 };
 
 }  // namespace ignis

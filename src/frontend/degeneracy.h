@@ -1,23 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "common/pose.h"
 
 namespace ignis {
 
+/// What tells an observed direction of the pose from one that only seems so.
+struct DegeneracyLimits {
+  double length_m = 1.0;           ///< mean range of the points: makes attitude and position comparable
+  double min_sensitivity = 0.0;    ///< mean squared sensitivity per point below which a direction is degenerate
+  double min_signal_to_noise = 0;  ///< the same, relative to what the errors of the normals alone make of it
+};
+
 /// Which directions of a 6-dimensional pose error (attitude in body axes, position in odom axes) a scan observes.
 struct DegeneracyAnalysis {
-  int degenerate_directions = 0;  ///< 0..6
-  Vector6d eigenvalues =
-      Vector6d::Zero();  ///< mean squared sensitivity per point, ascending; 1/3 or so is well observed
-  /// Projector on the observed directions, for pose errors: observed part = projector * error.
+  int degenerate_directions = 0;            ///< 0..6
+  Vector6d eigenvalues = Vector6d::Zero();  ///< mean squared sensitivity per point, ascending; 1/3 is well observed
+  Vector6d noise = Vector6d::Zero();        ///< the part of each eigenvalue that errors of the normals explain
+  /// Degenerate unit directions in scaled coordinates: (length x attitude, position).
+  std::vector<Vector6d> degenerate;
+  /// What corrects the state: keeps a direction of the pose error by the square root of the share of its sensitivity
+  /// that is no noise. A degenerate direction with a little true structure is so still used for what it is worth.
+  Matrix6d weighting = Matrix6d::Identity();
+  /// What the covariance may rely on: the same, and nothing along degenerate directions.
   Matrix6d projector = Matrix6d::Identity();
 };
 
-/// `sensitivity` is the mean of h h^T over the matched points, h = derivative of the point-to-plane distance. Attitude
-/// is scaled by `length_m` (mean range of the points) first, so that all six eigenvalues are of one kind. Directions
-/// with an eigenvalue below the threshold are degenerate. After: J. Zhang, M. Kaess, S. Singh, "On degeneracy of
-/// optimization-based state estimation problems", ICRA 2016.
-[[nodiscard]] DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, double length_m, double threshold);
+/// `sensitivity` is the mean of h h^T over the matched points, h = derivative of the point-to-plane distance; `noise`
+/// is the mean of what the errors of the plane normals add to it. A bare corridor's walls have normals that are off by
+/// a degree at random: along the corridor they look like many weak constraints, all of which say "no motion". Their
+/// expected size is known from the plane fits, so a direction counts as observed only when it shows more than that.
+/// Attitude is scaled by the length first, so that all six eigenvalues are of one kind.
+/// After: J. Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state estimation problems", ICRA 2016, for
+/// the projection; the subtraction of the expected noise is the usual correction for errors in variables.
+[[nodiscard]] DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6d& noise,
+                                                    const DegeneracyLimits& limits);
+
+/// The degenerate directions for people: each by its larger part, position in odom axes or attitude in body axes. Empty
+/// when there are none.
+[[nodiscard]] std::string describe(const DegeneracyAnalysis& analysis);
 
 }  // namespace ignis

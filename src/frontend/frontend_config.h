@@ -57,6 +57,13 @@ struct FrontendConfig {
   double noise_prior_points = 20.0;
   double residual_inflation = 4.0;
   double degeneracy_threshold = 1e-5;
+  double degeneracy_signal_to_noise = 1.6;
+  int map_average_points = 1;
+  double map_drift = 1.0;
+  double wide_match_radius_m = 0.0;
+  double imu_timeout_s = 0.5;
+  double degraded_sigma_m = 0.15;
+  double lost_sigma_m = 1.0;
   int min_scan_points = 50;
   int min_matches = 20;
   int max_scan_points = 3000;
@@ -81,6 +88,11 @@ struct FrontendConfig {
     };
     if (!(max_range_m > min_range_m)) refuse("max_range_m", max_range_m, "more than min_range_m");
     if (!(match_radius_m >= voxel_size_m)) refuse("match_radius_m", match_radius_m, "at least voxel_size_m");
+    if (!(wide_match_radius_m == 0.0 ||
+          (wide_match_radius_m > match_radius_m && wide_match_radius_m <= 10.0 * voxel_size_m))) {
+      refuse("wide_match_radius_m", wide_match_radius_m,
+             "0, or more than match_radius_m and at most 10 x voxel_size_m");
+    }
     if (!(match_radius_m <= 10.0 * voxel_size_m)) {
       refuse("match_radius_m", match_radius_m, "at most 10 x voxel_size_m (the search is over voxels)");
     }
@@ -160,6 +172,22 @@ struct FrontendConfig {
                  "factor on the residuals' variance: points that share a plane share its error");
     visit.number("degeneracy_threshold", self.degeneracy_threshold, {0.0, 0.3}, "1",
                  "mean squared sensitivity per point below which a direction is left to the IMU");
+    visit.number(
+        "degeneracy_signal_to_noise", self.degeneracy_signal_to_noise, {0.0, 1000.0}, "1",
+        "sensitivity of a direction over what errors of the normals explain of it, below which it is left to the "
+        "IMU");
+    visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
+                  "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
+    visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",
+                 "factor on the variance that each scan leaves in the published covariance for good");
+    visit.number("wide_match_radius_m", self.wide_match_radius_m, {0.0, 10.0}, "m",
+                 "neighbour radius for points that find too few within match_radius_m; 0: none");
+    visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",
+                 "scan time without IMU data after which scans go on alone, at constant velocity");
+    visit.number("degraded_sigma_m", self.degraded_sigma_m, {0.001, 1000.0}, "m",
+                 "largest position sigma of a pose that is reported as OK");
+    visit.number("lost_sigma_m", self.lost_sigma_m, {0.001, 1000.0}, "m",
+                 "largest position sigma of a pose that is still of use");
     visit.integer("min_scan_points", self.min_scan_points, {1, 100000}, "points", "fewer: the scan is skipped");
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
     visit.integer("max_scan_points", self.max_scan_points, {100, 200000}, "points",

@@ -8,8 +8,10 @@ namespace ignis {
 namespace {
 
 // Beyond what any MEMS unit reports: such values are garbage on the wire (1e24 has been seen), not motion.
-constexpr double kMaxRate = 200.0;    // rad/s
-constexpr double kMaxAccel = 2000.0;  // m/s^2
+constexpr double kMaxRate = 200.0;          // rad/s
+constexpr double kMaxAccel = 2000.0;        // m/s^2
+constexpr double kCoastingPeriods = 400.0;  // as uncertain as a gap of this length: twenty times the sigma
+constexpr std::int64_t kLeapUs = kMicrosPerSecond;
 
 }  // namespace
 
@@ -25,6 +27,8 @@ std::string_view text(ImuFault fault) {
       return "duplicate stamp";
     case ImuFault::kLate:
       return "older than the newest sample";
+    case ImuFault::kLeap:
+      return "stamp far ahead of the stream";
   }
   return "unknown fault";
 }
@@ -46,7 +50,21 @@ ImuFault ImuBuffer::judge(const ImuSample& sample) {
     ++counters_.late;
     return ImuFault::kLate;
   }
+  if (leaps_ahead(sample.utime)) {
+    ++counters_.leaps;
+    return ImuFault::kLeap;
+  }
   return ImuFault::kNone;
+}
+
+bool ImuBuffer::leaps_ahead(Utime utime) {
+  if (samples_.empty() || utime - newest() <= kLeapUs) {
+    put_aside_.reset();
+    return false;
+  }
+  const bool carries_on = put_aside_ && utime > *put_aside_ && utime - *put_aside_ <= kLeapUs;
+  put_aside_ = utime;
+  return !carries_on;
 }
 
 ImuFault ImuBuffer::add(const ImuSample& sample) {
@@ -65,6 +83,12 @@ ImuFault ImuBuffer::add(const ImuSample& sample) {
   if (periods > kGapPeriods) ++counters_.gaps;
   if (sample.saturated) ++counters_.saturated;
   return ImuFault::kNone;
+}
+
+void ImuBuffer::add_coasting(const ImuSample& sample) {
+  samples_.push_back(sample);
+  periods_before_.push_back(kCoastingPeriods);
+  ++counters_.coasted;
 }
 
 double ImuBuffer::nominal_period_us() const {

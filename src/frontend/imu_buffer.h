@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -11,7 +12,7 @@
 namespace ignis {
 
 /// Why an IMU sample was not taken.
-enum class ImuFault : std::int8_t { kNone, kNotFinite, kImplausible, kDuplicate, kLate };
+enum class ImuFault : std::int8_t { kNone, kNotFinite, kImplausible, kDuplicate, kLate, kLeap };
 
 [[nodiscard]] std::string_view text(ImuFault fault);
 
@@ -24,6 +25,8 @@ struct ImuCounters {
   std::int64_t late = 0;
   std::int64_t gaps = 0;       ///< intervals longer than three nominal periods
   std::int64_t saturated = 0;  ///< accepted with the clip flag
+  std::int64_t leaps = 0;      ///< stamps far ahead of the stream, put aside
+  std::int64_t coasted = 0;    ///< made up where the IMU was silent
 };
 
 /// The recent IMU samples in time order, and what is wrong with their stream. The nominal period is learned from the
@@ -31,7 +34,13 @@ struct ImuCounters {
 class ImuBuffer {
  public:
   /// Appends a sample, or says why not. Depends on earlier samples only.
+  ///
+  /// A stamp more than a second ahead of the stream is put aside: taken at its word, one corrupt stamp would make all
+  /// later samples "late". Only when the next sample carries on from it was it a gap, and that one is taken.
   ImuFault add(const ImuSample& sample);
+
+  /// Appends a made-up sample where the IMU is silent. Its interval counts as a gap.
+  void add_coasting(const ImuSample& sample);
 
   /// Forgets samples before `utime`, but keeps one at or before it.
   void forget_before(Utime utime);
@@ -50,12 +59,14 @@ class ImuBuffer {
   static constexpr std::size_t kMedianLength = 31;
 
   [[nodiscard]] ImuFault judge(const ImuSample& sample);
+  [[nodiscard]] bool leaps_ahead(Utime utime);
   [[nodiscard]] double nominal_period_us() const;
 
   std::vector<ImuSample> samples_;
   std::vector<double> periods_before_;
   std::array<std::int64_t, kMedianLength> intervals_us_{};  ///< ring of the last intervals
   std::size_t interval_count_ = 0;
+  std::optional<Utime> put_aside_;  ///< stamp of the last leap
   ImuCounters counters_;
 };
 

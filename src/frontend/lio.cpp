@@ -11,12 +11,14 @@
 namespace ignis {
 namespace {
 
-constexpr std::size_t kMaxPendingScans = 40;                // two seconds of L1 scans without IMU
-constexpr std::int32_t kMaxScanDurationUs = 500'000;        // longer is not a scan but a broken stamp
-constexpr std::int64_t kMaxLeadUs = 10 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
-constexpr std::int64_t kHistoryUs = kMicrosPerSecond;       // IMU kept behind the committed state, for deskewing
-constexpr double kSaturatedNoiseScale = 100.0;              // a clipped axis says little: ten times the sigma
-constexpr int kScansOfMovingStart = 2;                      // one gives a velocity, the second confirms it
+constexpr std::size_t kMaxPendingScans = 40;               // two seconds of L1 scans without IMU
+constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a scan but a broken stamp
+constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
+constexpr std::int64_t kCoastingStepUs = 10'000;           // between samples that stand in for a silent IMU
+constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sample the biases learn nothing
+constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
+constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
+constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
   std::vector<Eigen::Vector3f> result;
@@ -29,15 +31,32 @@ double velocity_sigma(const FilterState& filter) {
   return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
 }
 
+/// The filter once its attitude is known by definition.
+void condition_on_attitude(FilterState& filter) {
+  constexpr double kVariance = 1e-8;  // rad^2: keeps the covariance invertible
+  const Eigen::Matrix<double, 15, 3> columns = filter.covariance.middleCols<3>(kAttitude);
+  const Eigen::Matrix3d innovation =
+      filter.covariance.block<3, 3>(kAttitude, kAttitude) + kVariance * Eigen::Matrix3d::Identity();
+  filter.covariance -= columns * innovation.inverse() * columns.transpose();
+  (void)make_symmetric(filter.covariance);
+}
+
 }  // namespace
 
 Lio::Lio(const FrontendConfig& config)
-    : config_(config), initialisation_(config), matcher_(config), map_(config), keyframer_(config, 0) {}
+    : config_(config),
+      initialisation_(config),
+      matcher_(config),
+      map_(config),
+      drift_(config.map_drift),
+      keyframer_(config, 0),
+      trust_(config) {}
 
 void Lio::reset() {
   ++session_;
   imu_ = ImuBuffer();
   initialisation_ = ImuInitialisation(config_);
+  matcher_ = ScanMatcher(config_);
   map_.clear();
   keyframer_ = Keyframer(config_, session_);
   pending_.clear();
@@ -48,12 +67,25 @@ void Lio::reset() {
   velocity_known_ = false;
   applied_scans_ = 0;
   contradictions_ = 0;
+  trust_ = TrustMonitor(config_);
+  last_clipped_.reset();
+}
+
+LioStatus Lio::status() const {
+  LioStatus status;
+  status.running = running_;
+  status.text = initialisation_.report();
+  status.trust = running_ ? trust_.trust() : Trust::kDegraded;
+  status.reason = running_ ? trust_.reason() : status.text;
+  return status;
 }
 
 ImuResult Lio::add_imu(const ImuSample& sample) {
   ImuResult result;
   result.fault = imu_.add(sample);
   if (result.fault != ImuFault::kNone) return result;
+  trust_.note_imu(sample.utime);
+  if (sample.saturated) last_clipped_ = sample.utime;
 
   if (running_) {
     const std::size_t last = imu_.samples().size() - 1;
@@ -62,10 +94,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
                             config_.gravity_m);
     live_.utime = sample.utime;
   } else if (std::optional<FilterState> first = initialisation_.add(sample)) {
-    filter_ = *first;
-    live_ = filter_.nominal;
-    running_ = true;
-    velocity_known_ = config_.start == "at_rest";
+    start(*first);
   }
   result.scans = process_pending();
   if (running_) {
@@ -74,6 +103,21 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     result.state = live_;
   }
   return result;
+}
+
+void Lio::start(const FilterState& first) {
+  filter_ = first;
+  cautious_ = first.covariance;
+  live_ = filter_.nominal;
+  running_ = true;
+  velocity_known_ = config_.start == "at_rest";
+  drift_ = MapDrift(config_.map_drift);
+  if (!velocity_known_) return;
+  // The first pose defines the frame of the map; that this frame may not be level is drift, not an error of the pose in
+  // it. Gravity's direction in that frame is then what the accelerometer bias has to account for.
+  drift_.begin(filter_.covariance.block<3, 3>(kAttitude, kAttitude), filter_.nominal.T_odom_body);
+  condition_on_attitude(filter_);
+  cautious_ = filter_.covariance;
 }
 
 std::vector<ScanResult> Lio::add_scan(Scan scan) {
@@ -86,7 +130,9 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
     return results;
   }
   last_scan_end_ = scan.end_utime();
+  trust_.note_arrival(scan.end_utime());
   pending_.push_back(std::move(scan));
+  coast_to(*last_scan_end_ - to_micros(config_.imu_timeout_s));
   results = process_pending();
   if (pending_.size() > kMaxPendingScans) {
     results.push_back(refuse(pending_.front(), ScanReason::kNoImu));
@@ -124,10 +170,19 @@ ScanResult Lio::process(const Scan& scan) {
   }
   advance_to(scan.end_utime());
   std::vector<CloudPoint> cloud = deskew(scan, filter_.nominal, imu_.samples(), config_);
+  const FilterState predicted = filter_;
   MatchResult match = correct(cloud);
   match.stats.points = static_cast<int>(cloud.size());
   filter_ = match.filter;
+  if (last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs) keep_biases(predicted);
+  if (match.stats.applied()) {
+    const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable);
+    if (update.ok) cautious_ = update.covariance;
+    drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans);
+  }
   if (match.stats.applied()) ++applied_scans_;
+  note_evidence(predicted, match.stats, scan);
+  match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(scan, match.stats.reason, cloud);
   grow_map(cloud, match.stats.reason);
 
@@ -140,14 +195,16 @@ ScanResult Lio::process(const Scan& scan) {
   result.stats.map_points = map_.size();
   result.has_state = true;
   result.state = filter_.nominal;
-  result.covariance = filter_.covariance;
-  if (velocity_known_) result.keyframe = keyframer_.add_scan(filter_, match.information_body, cloud);
+  result.covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
+  if (velocity_known_)
+    result.keyframe = keyframer_.add_scan({filter_.nominal, result.covariance}, match.information_body, cloud);
   result.cloud = std::move(cloud);
   return result;
 }
 
 MatchResult Lio::correct(const std::vector<CloudPoint>& cloud) {
-  MatchResult result{filter_, {}, Matrix6d::Zero()};
+  MatchResult result;
+  result.filter = filter_;
   if (std::ssize(cloud) < config_.min_scan_points) {
     result.stats.reason = ScanReason::kTooFewPoints;
   } else if (!config_.use_scan_matching) {
@@ -176,13 +233,56 @@ void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<C
 void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {
   if (reason == ScanReason::kTooFewPoints) return;
   contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
-  if (contradictions_ >= config_.reanchor_scans) {
-    map_.clear();
-    contradictions_ = 0;
-  }
+  if (contradictions_ >= config_.reanchor_scans) begin_new_map();
   const bool confirmed = contradictions_ == 0 || map_.empty();
   map_.insert(positions(cloud), filter_.nominal.T_odom_body, confirmed);
   map_.slide(filter_.nominal.T_odom_body.translation);
+}
+
+/// Whatever the old map was, this is another place or the pose was wrong: a new session begins here. Attitude to
+/// gravity, biases and velocity carry over with what is known of them.
+void Lio::begin_new_map() {
+  map_.clear();
+  contradictions_ = 0;
+  ++session_;
+  keyframer_ = Keyframer(config_, session_);
+  trust_.note_loss();
+}
+
+/// Samples that keep velocity and turn rate, up to an instant that the IMU has not reached. The biases learn nothing
+/// from them.
+void Lio::coast_to(Utime utime) {
+  if (!running_ || imu_.empty()) return;
+  while (imu_.newest() < utime) {
+    ImuSample sample;
+    sample.utime = imu_.newest() + kCoastingStepUs;
+    sample.gyro = live_.angular_rate + live_.gyro_bias;
+    sample.accel =
+        live_.T_odom_body.rotation.conjugate() * Eigen::Vector3d(0.0, config_.gravity_m, 0.0) + live_.accel_bias;
+    imu_.add_coasting(sample);
+    last_clipped_ = sample.utime;
+    live_ = predict_nominal(live_, {sample.gyro, sample.accel}, 1e-6 * kCoastingStepUs, config_.gravity_m);
+    live_.utime = sample.utime;
+  }
+}
+
+/// Undoes what a scan did to the biases. Their correlations with the rest are given up, which only widens the rest.
+void Lio::keep_biases(const FilterState& predicted) {
+  filter_.nominal.gyro_bias = predicted.nominal.gyro_bias;
+  filter_.nominal.accel_bias = predicted.nominal.accel_bias;
+  filter_.nominal.angular_rate = predicted.nominal.angular_rate;
+  filter_.covariance.rightCols<6>().setZero();
+  filter_.covariance.bottomRows<6>().setZero();
+  filter_.covariance.bottomRightCorner<6, 6>() = predicted.covariance.bottomRightCorner<6, 6>();
+}
+
+void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
+  stats.utime = scan.end_utime();
+  // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
+  trust_.note_scan({.stats = stats,
+                    .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
+                    .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
+                    .accel_bias_sigma = std::sqrt(filter_.covariance.diagonal().segment<3>(kAccelBias).maxCoeff())});
 }
 
 void Lio::advance_to(Utime utime) {
@@ -198,7 +298,12 @@ void Lio::advance_to(Utime utime) {
     const Utime step_end = std::min(utime, after.utime);
     const ImuSample first = interpolate(before, after, now);
     const ImuSample last = interpolate(before, after, step_end);
-    predict(filter_, midpoint(first, last), seconds_between(now, step_end), config_, noise_scale(next));
+    const InertialInput input = midpoint(first, last);
+    const double dt = seconds_between(now, step_end);
+    FilterState cautious{filter_.nominal, cautious_};
+    predict(cautious, input, dt, config_, noise_scale(next));
+    cautious_ = cautious.covariance;
+    predict(filter_, input, dt, config_, noise_scale(next));
     now = step_end;
   }
 }

@@ -13,8 +13,10 @@
 #include "frontend/imu_initialisation.h"
 #include "frontend/keyframer.h"
 #include "frontend/local_map.h"
+#include "frontend/map_drift.h"
 #include "frontend/scan_matcher.h"
 #include "frontend/scan_stats.h"
+#include "frontend/trust_monitor.h"
 
 namespace ignis {
 
@@ -38,6 +40,8 @@ struct ImuResult {
 struct LioStatus {
   bool running = false;
   std::string text;  ///< what is being waited for, what was refused, or how it started
+  Trust trust = Trust::kDegraded;
+  std::string reason;  ///< of the trust
 };
 
 /// LiDAR-inertial odometry: an error-state Kalman filter driven by the IMU and corrected by scans against a local map.
@@ -56,7 +60,7 @@ class Lio {
   /// Forgets everything and starts a new session.
   void reset();
 
-  [[nodiscard]] LioStatus status() const { return {running_, initialisation_.report()}; }
+  [[nodiscard]] LioStatus status() const;
   [[nodiscard]] const ImuCounters& imu_counters() const { return imu_.counters(); }
   [[nodiscard]] std::int32_t session() const { return session_; }
   [[nodiscard]] const LocalMap& map() const { return map_; }
@@ -68,7 +72,12 @@ class Lio {
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud);
   void grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason);
   void follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud);
+  void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
+  void begin_new_map();
+  void coast_to(Utime utime);
+  void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
+  void start(const FilterState& first);
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;
 
@@ -78,15 +87,21 @@ class Lio {
   ImuInitialisation initialisation_;
   ScanMatcher matcher_;
   LocalMap map_;
+  MapDrift drift_;
   Keyframer keyframer_;
+  TrustMonitor trust_;
   std::deque<Scan> pending_;
   std::optional<Utime> last_scan_end_;  ///< of the newest scan that was taken into the queue
   bool running_ = false;
   FilterState filter_;  ///< committed
+  /// Covariance of the same state when nothing is believed about directions that scans hardly observe. The filter's own
+  /// uses what little they say to correct the state; this one is published and judged by.
+  Matrix15d cautious_ = Matrix15d::Identity();
   NavState live_;
   bool velocity_known_ = false;
   int applied_scans_ = 0;
-  int contradictions_ = 0;  ///< in a row
+  int contradictions_ = 0;             ///< in a row
+  std::optional<Utime> last_clipped_;  ///< instant of the newest sample that says nothing about the biases
 };
 
 }  // namespace ignis

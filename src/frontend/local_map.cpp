@@ -52,7 +52,8 @@ LocalMap::LocalMap(const FrontendConfig& config)
     : voxel_size_(config.voxel_size_m),
       match_radius_(config.match_radius_m),
       window_(config.map_window_m),
-      window_y_(config.map_window_y) {
+      window_y_(config.map_window_y),
+      average_points_(config.map_average_points) {
   config::require_valid(config, "frontend");
   clear();
 }
@@ -61,6 +62,7 @@ void LocalMap::clear() {
   blocks_.clear();
   table_.assign(kFirstCapacity, kFree);
   size_ = 0;
+  scans_ = 0;
   has_slid_ = false;
 }
 
@@ -104,6 +106,7 @@ void LocalMap::rebuild_table(std::size_t capacity) {
 }
 
 void LocalMap::insert(std::span<const Eigen::Vector3f> points_body, const Pose& T_odom_body, bool confirmed) {
+  ++scans_;
   const Eigen::Matrix3d R = T_odom_body.rotation.toRotationMatrix();
   for (const Eigen::Vector3f& point : points_body) {
     insert_point(R * point.cast<double>() + T_odom_body.translation, confirmed);
@@ -120,25 +123,39 @@ void LocalMap::insert_point(const Eigen::Vector3d& point, bool confirmed) {
   Block& block = find_or_add(coordinate);
   const Eigen::Vector3f local = (point - kEdge * voxel_size_ * coordinate.cast<double>()).cast<float>();
   Eigen::Map<Eigen::Vector3f> stored(block.local[bit]);
-  if ((block.occupied & flag) != 0) {
-    const bool stored_confirmed = (block.confirmed & flag) != 0;
-    if (stored_confirmed && !confirmed) return;
-    const Eigen::Vector3f centre = ((inside.cast<double>().array() + 0.5) * voxel_size_).matrix().cast<float>();
-    const bool promotes = confirmed && !stored_confirmed;
-    if (!promotes && (local - centre).squaredNorm() >= (stored - centre).squaredNorm()) return;
-  } else {
-    ++size_;
+  float& scan = block.scan[bit];
+  std::uint16_t& weight = block.weight[bit];
+  const bool taken = (block.occupied & flag) != 0;
+  const bool taken_confirmed = (block.confirmed & flag) != 0;
+  if (taken_confirmed && !confirmed) return;
+  const bool merges = taken && taken_confirmed == confirmed;
+  if (merges && average_points_ > 1) {
+    if (weight < average_points_) ++weight;
+    const float share = 1.0F / static_cast<float>(weight);
+    stored += share * (local - stored);
+    scan += share * (static_cast<float>(scans_) - scan);
+    return;
   }
+  if (merges && !nearer_to_centre(local, stored, inside)) return;
+  if (!taken) ++size_;
   stored = local;
+  scan = static_cast<float>(scans_);
+  weight = 1;
   block.occupied |= flag;
   if (confirmed) block.confirmed |= flag;
 }
 
-NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query) const {
-  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(match_radius_);
+bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored,
+                                const Eigen::Vector3i& inside) const {
+  const Eigen::Vector3f centre = ((inside.cast<double>().array() + 0.5) * voxel_size_).matrix().cast<float>();
+  return (point - centre).squaredNorm() < (stored - centre).squaredNorm();
+}
+
+NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius) const {
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius);
   const Eigen::Vector3i lo = voxel_of(query - reach, voxel_size_);
   const Eigen::Vector3i hi = voxel_of(query + reach, voxel_size_);
-  const auto radius2 = static_cast<float>(match_radius_ * match_radius_);
+  const auto radius2 = static_cast<float>(radius * radius);
   const double block_size = kEdge * voxel_size_;
 
   NeighbourMoments moments;
@@ -152,9 +169,9 @@ NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query) const {
         const Eigen::Vector3f origin = (query - block_size * block->coordinate.cast<double>()).cast<float>();
         for (std::uint64_t left = block->confirmed & mask_yz & axis_mask(0, x, lo.x(), hi.x()); left != 0;
              left &= left - 1) {
-          const Eigen::Vector3f offset =
-              Eigen::Map<const Eigen::Vector3f>(block->local[std::countr_zero(left)]) - origin;
-          if (offset.squaredNorm() <= radius2) moments.add(offset.cast<double>());
+          const int bit = std::countr_zero(left);
+          const Eigen::Vector3f offset = Eigen::Map<const Eigen::Vector3f>(block->local[bit]) - origin;
+          if (offset.squaredNorm() <= radius2) moments.add(offset.cast<double>(), block->scan[bit]);
         }
       }
     }

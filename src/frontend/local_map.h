@@ -13,8 +13,9 @@
 
 namespace ignis {
 
-/// The cloud that scans are matched against: one point per voxel, the one nearest the voxel's centre, in a window that
-/// slides with the vehicle. Frame odom, metres.
+/// The cloud that scans are matched against: one point per voxel in a window that slides with the vehicle. Frame odom,
+/// metres. The point is the one nearest the voxel's centre or, with map_average_points above 1, the mean of all that
+/// fell into the voxel, the newest counting at least 1 / map_average_points: range noise averages out.
 ///
 /// Voxels live in blocks of 4x4x4 with one bit of occupancy each; blocks are found by open addressing. A neighbourhood
 /// is a few blocks and a bit mask, so its cost does not depend on the size of the map.
@@ -25,17 +26,21 @@ class LocalMap {
  public:
   explicit LocalMap(const FrontendConfig& config);
 
-  /// Registers body points at a pose.
+  /// Registers the body points of the next scan at a pose.
   void insert(std::span<const Eigen::Vector3f> points_body, const Pose& T_odom_body, bool confirmed);
 
-  /// Sums over the confirmed points within the match radius of a point.
-  [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query) const;
+  /// Sums over the confirmed points within a radius [m] of a point.
+  [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query, double radius) const;
+  /// The same for the match radius.
+  [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query) const { return gather(query, match_radius_); }
 
   /// Drops what left the window, once the vehicle has moved a quarter of the window since the last time.
   void slide(const Eigen::Vector3d& position);
 
   void clear();
 
+  /// Scans inserted since the map was begun.
+  [[nodiscard]] int scans() const { return scans_; }
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
   /// All points, confirmed or not, in a fixed order.
@@ -49,12 +54,16 @@ class LocalMap {
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of block edges
     std::uint64_t occupied = 0;
     std::uint64_t confirmed = 0;
-    float local[kVoxels][3];  ///< [m] relative to the block's corner
+    float local[kVoxels][3];        ///< [m] relative to the block's corner
+    float scan[kVoxels];            ///< mean number of the scans that the point comes from
+    std::uint16_t weight[kVoxels];  ///< points in the mean
   };
 
   [[nodiscard]] const Block* find(const Eigen::Vector3i& coordinate) const;
   [[nodiscard]] Block& find_or_add(const Eigen::Vector3i& coordinate);
   void insert_point(const Eigen::Vector3d& point, bool confirmed);
+  [[nodiscard]] bool nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored,
+                                      const Eigen::Vector3i& inside) const;
   void rebuild_table(std::size_t capacity);
   [[nodiscard]] std::size_t slot_of(const Eigen::Vector3i& coordinate) const;
 
@@ -62,9 +71,11 @@ class LocalMap {
   double match_radius_;
   double window_;
   double window_y_;
+  int average_points_;
   std::vector<Block> blocks_;
   std::vector<std::int32_t> table_;  ///< index into blocks_, -1 when free; power of two, at most half full
   int size_ = 0;
+  int scans_ = 0;
   bool has_slid_ = false;
   Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();
 };

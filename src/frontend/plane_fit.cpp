@@ -8,7 +8,7 @@
 
 namespace ignis {
 
-PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config) {
+PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config, double radius) {
   PlaneFit fit;
   if (moments.count < config.min_plane_points) return fit;
 
@@ -19,18 +19,23 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   solver.computeDirect(scatter);
   const Eigen::Vector3d lambda = solver.eigenvalues().cwiseMax(0.0);
   fit.normal = solver.eigenvectors().col(0);
+  fit.mean_scan = moments.scan_sum * inverse_count;
 
   const double tangential = (fit.offset - fit.normal * fit.normal.dot(fit.offset)).norm();
   if (!(lambda[0] < config.max_curvature * lambda[2])) {
     fit.verdict = PlaneVerdict::kBlob;
   } else if (!(lambda[1] > config.min_spread * lambda[2])) {
     fit.verdict = PlaneVerdict::kLine;
-  } else if (!(tangential <= config.max_centroid_offset * config.match_radius_m)) {
+  } else if (!(tangential <= config.max_centroid_offset * radius)) {
     fit.verdict = PlaneVerdict::kOneSided;
   } else if (!(std::sqrt(lambda[0]) <= config.max_surface_roughness)) {
     fit.verdict = PlaneVerdict::kRough;
   } else {
     fit.verdict = PlaneVerdict::kPlane;
+    // Three degrees of freedom went into the plane itself.
+    const double across = lambda[0] / std::max(moments.count - 3, 1);
+    fit.normal_sigma.col(0) = std::sqrt(across / lambda[1]) * solver.eigenvectors().col(1);
+    fit.normal_sigma.col(1) = std::sqrt(across / lambda[2]) * solver.eigenvectors().col(2);
   }
   return fit;
 }

@@ -16,6 +16,8 @@ constexpr double kConvergedPosition = 1e-4;  // m
 constexpr double kConvergedAngle = 1e-5;     // rad
 // A normal "touches" a world axis when its component exceeds this; every unit vector touches at least one.
 constexpr double kTouch = 0.5;
+constexpr double kShareOfNewestScan = 0.1;
+constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say little about what is observed
 
 Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, const Eigen::Vector3d& normal) {
   Vector6d h;
@@ -31,11 +33,17 @@ double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
 
 }  // namespace
 
-ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config) { config::require_valid(config, "frontend"); }
+ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), wide_config_(config) {
+  config::require_valid(config, "frontend");
+  // A wide neighbourhood reaches round corners and over tree crowns: it has to be flatter to count as a plane.
+  wide_config_.max_surface_roughness *= 0.5;
+  wide_config_.max_curvature /= 3.0;
+}
 
 MatchResult ScanMatcher::match(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
                                const LocalMap& map) {
-  MatchResult result{predicted, {}, Matrix6d::Zero()};
+  MatchResult result;
+  result.filter = predicted;
   associate(predicted.nominal.T_odom_body, points_body, map);
   result.stats.matched = static_cast<int>(constraints_.size());
   if (result.stats.matched < config_.min_matches) {
@@ -43,14 +51,18 @@ MatchResult ScanMatcher::match(const FilterState& predicted, std::span<const Eig
     return result;
   }
   const Assessment assessment = assess(predicted);
+  find_observed_directions(assessment, map);
   result.stats.mean_innovation = assessment.mean_innovation;
   result.stats.observability = assessment.observability;
   const bool iterated = iterate(predicted, points_body, map, result);
   result.stats.degenerate_directions = degeneracy_.degenerate_directions;
+  result.stats.unobserved = describe(degeneracy_);
+  result.map_age_scans = map.scans() + 1.0 - mean_map_scan_;
   result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
   if (!result.stats.applied()) {
     result.filter = predicted;
     result.information_body.setZero();
+    result.reliable = {};
   }
   return result;
 }
@@ -59,15 +71,25 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   constraints_.clear();
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   double range_sum = 0.0;
+  double scan_sum = 0.0;
   for (const Eigen::Vector3f& point : points_body) {
     const Eigen::Vector3d point_body = point.cast<double>();
     const Eigen::Vector3d query = R * point_body + pose.translation;
-    const PlaneFit plane = fit_plane(map.gather(query), config_);
+    PlaneFit plane = fit_plane(map.gather(query), config_);
+    // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
+    // where it is not.
+    if (plane.verdict == PlaneVerdict::kTooFewPoints && config_.wide_match_radius_m > 0.0) {
+      const double radius = config_.wide_match_radius_m;
+      plane = fit_plane(map.gather(query, radius), wide_config_, radius);
+    }
     if (plane.verdict != PlaneVerdict::kPlane) continue;
-    constraints_.push_back({point_body, plane.normal, plane.normal.dot(query + plane.offset), 1.0});
+    constraints_.push_back({point_body, plane.normal, plane.normal.dot(query + plane.offset), 1.0, plane.normal_sigma});
     range_sum += point_body.norm();
+    scan_sum += plane.mean_scan;
   }
-  mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / static_cast<double>(constraints_.size()), 0.1);
+  const double count = std::max(static_cast<double>(constraints_.size()), 1.0);
+  mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / count, 0.1);
+  mean_map_scan_ = scan_sum / count;
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
@@ -76,19 +98,31 @@ ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
   const Matrix6d P = predicted.covariance.topLeftCorner<6, 6>();
   const auto count = static_cast<double>(constraints_.size());
   Assessment assessment;
-  Matrix6d sensitivity = Matrix6d::Zero();
   for (const Constraint& constraint : constraints_) {
     const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
     const double z = constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance;
     assessment.mean_innovation += std::abs(z) / count;
     assessment.observability += constraint.normal.cwiseAbs2() / count;
-    sensitivity += h * h.transpose() / count;
+    assessment.sensitivity += h * h.transpose() / count;
+    for (int k = 0; k < 2; ++k) {
+      const Vector6d error = jacobian(R, constraint.point_body, constraint.normal_sigma.col(k));
+      assessment.normal_noise += error * error.transpose() / count;
+    }
   }
   // trace(P S) is the mean of h^T P h over the points.
-  assessment.expected_innovation = std::sqrt(std::max((P * sensitivity).trace(), 0.0));
-  degeneracy_ = analyse_degeneracy(sensitivity, mean_range_, config_.degeneracy_threshold);
+  assessment.expected_innovation = std::sqrt(std::max((P * assessment.sensitivity).trace(), 0.0));
   weigh(assessment.observability);
   return assessment;
+}
+
+void ScanMatcher::find_observed_directions(const Assessment& assessment, const LocalMap& map) {
+  // One scan is half a turn of an L1's head, and a few lucky normals make a blind direction look observed for a moment,
+  // which is enough to pin the pose to the prediction. Half a second of scans decides.
+  const double share = map.scans() < kYoungMapScans ? 1.0 : kShareOfNewestScan;
+  sensitivity_ += share * (assessment.sensitivity - sensitivity_);
+  normal_noise_ += share * (assessment.normal_noise - normal_noise_);
+  degeneracy_ = analyse_degeneracy(sensitivity_, normal_noise_,
+                                   {mean_range_, config_.degeneracy_threshold, config_.degeneracy_signal_to_noise});
 }
 
 void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
@@ -144,8 +178,9 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
       (void)assess(iterate);
       associated_at = iterate.nominal.T_odom_body;
     }
-    const PoseInformation sum =
-        accumulate(iterate.nominal.T_odom_body, gate_covariance.topLeftCorner<6, 6>()).projected(degeneracy_.projector);
+    const PoseInformation all = accumulate(iterate.nominal.T_odom_body, gate_covariance.topLeftCorner<6, 6>());
+    const PoseInformation sum = all.projected(degeneracy_.weighting);
+    result.reliable = all.projected(degeneracy_.projector);
     const UpdateStep update =
         information_update(predicted.covariance, difference(predicted.nominal, iterate.nominal), sum);
     if (!update.ok) return false;
@@ -155,7 +190,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
 
     Matrix6d to_odom = Matrix6d::Identity();
     to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
-    result.information_body = to_odom.transpose() * sum.information * to_odom;
+    result.information_body = to_odom.transpose() * result.reliable.information * to_odom;
     result.stats.used = sum.count;
     if (update.step.segment<3>(kPosition).norm() < kConvergedPosition &&
         update.step.segment<3>(kAttitude).norm() < kConvergedAngle) {

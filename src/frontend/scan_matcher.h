@@ -20,10 +20,14 @@ struct MatchResult {
   /// What the scan alone says about the pose (sum of h h^T / r, observed directions only); attitude and position both
   /// in body axes. Zero when not applied.
   Matrix6d information_body = Matrix6d::Zero();
+  /// The same as sum over the points, order and axes of PoseInformation: what the covariance may rely on.
+  PoseInformation reliable;
+  double map_age_scans = 1.0;  ///< mean age of the map points that the scan met
 };
 
 /// Corrects a predicted state by matching deskewed points against planes of the local map: assessment, quality gate,
-/// iterated update, trust region. Pure: the map is only read.
+/// iterated update, trust region. The map is only read; what is kept from scan to scan is which directions were
+/// observed.
 class ScanMatcher {
  public:
   explicit ScanMatcher(const FrontendConfig& config);
@@ -35,18 +39,22 @@ class ScanMatcher {
   /// A point and the plane that it was associated with. The plane stays over the passes until the iterate has moved.
   struct Constraint {
     Eigen::Vector3d point_body;
-    Eigen::Vector3d normal;  ///< odom axes
-    double plane_distance;   ///< [m] normal . centroid
-    double weight;           ///< observability weight, (0, 1]
+    Eigen::Vector3d normal;                    ///< odom axes
+    double plane_distance;                     ///< [m] normal . centroid
+    double weight;                             ///< observability weight, (0, 1]
+    Eigen::Matrix<double, 3, 2> normal_sigma;  ///< see PlaneFit
   };
   struct Assessment {
     double mean_innovation = 0.0;      ///< [m]
     double expected_innovation = 0.0;  ///< [m] root mean square that the prediction's own covariance explains
     Eigen::Vector3d observability = Eigen::Vector3d::Zero();
+    Matrix6d sensitivity = Matrix6d::Zero();   ///< mean of h h^T over the points
+    Matrix6d normal_noise = Matrix6d::Zero();  ///< what errors of the normals add to it
   };
 
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
+  void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);
   [[nodiscard]] double point_variance(const Pose& pose) const;
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance) const;
@@ -57,9 +65,13 @@ class ScanMatcher {
                                  const MatchResult& result) const;
 
   FrontendConfig config_;
+  FrontendConfig wide_config_;  ///< gates of planes in the wide neighbourhood
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
+  Matrix6d sensitivity_ = Matrix6d::Zero();   ///< running mean over scans
+  Matrix6d normal_noise_ = Matrix6d::Zero();  ///< the same
   double mean_range_ = 1.0;
+  double mean_map_scan_ = 0.0;  ///< number of the scan that a met map point comes from
 };
 
 }  // namespace ignis

@@ -40,4 +40,10 @@ bool is_contradiction(ScanReason reason) {
          reason == ScanReason::kVelocityCorrectionTooLarge || reason == ScanReason::kNumericalFailure;
 }
 
+std::string explanation(const ScanStats& stats) {
+  std::string words(text(stats.reason));
+  if (!stats.unobserved.empty()) words += "; not observed: " + stats.unobserved;
+  return words;
+}
+
 }  // namespace ignis

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include <Eigen/Core>
@@ -50,10 +51,15 @@ struct ScanStats {
   double velocity_correction = 0.0;  ///< [m/s]
   Eigen::Vector3d observability = Eigen::Vector3d::Zero();  ///< diagonal of sum(n n^T) over its trace, world axes
   int degenerate_directions = 0;                            ///< eigen-directions left to the IMU
-  Pose T_odom_body;                                         ///< after this scan
-  int map_points = 0;                                       ///< in the local map, after this scan
+  std::string unobserved;                                   ///< these directions in words, see describe()
+  double imu_disagreement = 0.0;  ///< [sigma] between scan motion and IMU motion over two seconds, see TrustMonitor
+  Pose T_odom_body;               ///< after this scan
+  int map_points = 0;             ///< in the local map, after this scan
 
   [[nodiscard]] bool applied() const { return reason == ScanReason::kApplied; }
 };
+
+/// The reason in words, and which directions the scan left open.
+[[nodiscard]] std::string explanation(const ScanStats& stats);
 
 }  // namespace ignis

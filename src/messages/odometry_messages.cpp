@@ -62,7 +62,7 @@ scan_stats_t to_message(const ScanStats& stats) {
   message.session = stats.session;
   message.applied = stats.applied() ? 1 : 0;
   message.reason = static_cast<std::int8_t>(stats.reason);
-  message.reason_text = text(stats.reason);
+  message.reason_text = explanation(stats);
   message.points = stats.points;
   message.matched = stats.matched;
   message.used = stats.used;

@@ -32,6 +32,26 @@ TEST(ImuBuffer, CountsEachFaultAndKeepsTheSampleOut) {
   EXPECT_EQ(buffer.counters().late, 1);
 }
 
+TEST(ImuBuffer, OneStampFarAheadDoesNotBlockTheStream) {
+  ImuBuffer buffer;
+  Utime now = 0;
+  for (int i = 0; i < 40; ++i) (void)buffer.add(at(now += 4000));
+  EXPECT_EQ(buffer.add(at(now + 3'600'000'000)), ImuFault::kLeap);
+  EXPECT_EQ(buffer.add(at(now += 4000)), ImuFault::kNone);
+  EXPECT_EQ(buffer.counters().leaps, 1);
+  EXPECT_EQ(buffer.newest(), now);
+}
+
+TEST(ImuBuffer, TakesALongGapOnceTheStreamCarriesOnBeyondIt) {
+  ImuBuffer buffer;
+  Utime now = 0;
+  for (int i = 0; i < 40; ++i) (void)buffer.add(at(now += 4000));
+  now += 5'000'000;
+  EXPECT_EQ(buffer.add(at(now)), ImuFault::kLeap);
+  EXPECT_EQ(buffer.add(at(now + 4000)), ImuFault::kNone);
+  EXPECT_TRUE(buffer.gap_before(40));
+}
+
 TEST(ImuBuffer, LearnsThePeriodFromTheData) {
   for (const Utime period : {4'000, 10'000, 100'000}) {
     ImuBuffer buffer;

@@ -28,6 +28,22 @@ LioRun run_lio(const FrontendConfig& config, const Drive& drive, double scan_del
   return run;
 }
 
+FrontendConfig tuned_config() {
+  FrontendConfig config;
+  config.voxel_size_m = 0.1;
+  config.match_radius_m = 0.15;
+  config.wide_match_radius_m = 0.3;
+  config.degeneracy_signal_to_noise = 2.0;
+  config.map_average_points = 1000;
+  config.min_plane_points = 4;
+  config.max_curvature = 0.3;
+  config.max_centroid_offset = 0.6;
+  config.max_surface_roughness = 0.05;
+  config.accel_bias_walk = 0.01;
+  config.accel_bias_sigma = 0.06;
+  return config;
+}
+
 double drive_seconds(const Drive& drive, Utime utime) { return seconds_between(drive.imu.front().utime, utime); }
 
 double aligned_error(const LioRun& run, const Drive& drive) {

@@ -29,4 +29,7 @@ struct LioRun {
 
 [[nodiscard]] int count(const LioRun& run, ScanReason reason);
 
+/// The front end of config/ignis8_tuned.json.
+[[nodiscard]] FrontendConfig tuned_config();
+
 }  // namespace ignis::test

@@ -50,6 +50,43 @@ TEST(LocalMap, KeepsThePointNearestTheVoxelCentre) {
   EXPECT_LT((map.points()[0] - Eigen::Vector3d(0.11, 0.1, 0.1)).norm(), 1e-6);
 }
 
+TEST(LocalMap, MeanOfAVoxelLosesTheRangeNoise) {
+  const auto rms_of_wall = [](int average) {
+    FrontendConfig config;
+    config.map_average_points = average;
+    LocalMap map(config);
+    std::mt19937 random(4);
+    std::normal_distribution<float> normal(0.0F, 0.02F);
+    std::uniform_real_distribution<float> uniform(-2.0F, 2.0F);
+    for (int scan = 0; scan < 50; ++scan) {
+      std::vector<Eigen::Vector3f> points;
+      for (int i = 0; i < 400; ++i) {
+        const float x = uniform(random);
+        const float y = uniform(random);
+        points.emplace_back(x, y, 0.1F + normal(random));
+      }
+      map.insert(points, {}, true);
+    }
+    double sum = 0.0;
+    for (const Eigen::Vector3d& point : map.points()) sum += (point.z() - 0.1) * (point.z() - 0.1);
+    return std::sqrt(sum / map.size());
+  };
+  EXPECT_LT(rms_of_wall(1000), 0.006) << "50 points a voxel: 0.02 / sqrt(50) = 0.003";
+  EXPECT_LT(rms_of_wall(1000), 0.6 * rms_of_wall(1));
+}
+
+TEST(LocalMap, KnowsWhichScansItsPointsComeFrom) {
+  FrontendConfig config;
+  config.map_average_points = 1000;
+  LocalMap map(config);
+  const std::vector<Eigen::Vector3f> point = {{0.1F, 0.1F, 0.1F}};
+  for (int scan = 0; scan < 4; ++scan) map.insert(point, {}, true);
+  EXPECT_EQ(map.scans(), 4);
+  const NeighbourMoments moments = map.gather({0.1, 0.1, 0.1});
+  EXPECT_EQ(moments.count, 1);
+  EXPECT_NEAR(moments.scan_sum, 2.5, 1e-6);
+}
+
 TEST(LocalMap, HandlesNegativeCoordinates) {
   LocalMap map(FrontendConfig{});
   map.insert(std::vector<Eigen::Vector3f>{{-0.05F, -0.05F, -0.05F}, {0.05F, 0.05F, 0.05F}}, {}, true);

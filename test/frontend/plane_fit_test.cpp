@@ -37,6 +37,29 @@ TEST(PlaneFit, FindsNormalAndDistanceOfATiltedPlane) {
   }
 }
 
+TEST(PlaneFit, SigmaOfTheNormalMatchesSampledErrors) {
+  FrontendConfig config;
+  config.max_surface_roughness = 0.1;
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  Eigen::Matrix3d sampled = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d claimed = Eigen::Matrix3d::Zero();
+  constexpr int kTrials = 4000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    NeighbourMoments moments;
+    for (int i = -2; i <= 2; ++i) {
+      for (int j = -2; j <= 2; ++j) moments.add({0.2 * i, 0.1 * j, noise(random)});
+    }
+    const PlaneFit fit = fit_plane(moments, config);
+    ASSERT_EQ(fit.verdict, PlaneVerdict::kPlane);
+    const Eigen::Vector3d error = fit.normal * (fit.normal.z() > 0.0 ? 1.0 : -1.0) - Eigen::Vector3d::UnitZ();
+    sampled += error * error.transpose() / kTrials;
+    claimed += fit.normal_sigma * fit.normal_sigma.transpose() / kTrials;
+  }
+  EXPECT_NEAR(claimed(0, 0) / sampled(0, 0), 1.0, 0.15);
+  EXPECT_NEAR(claimed(1, 1) / sampled(1, 1), 1.0, 0.15);
+}
+
 TEST(PlaneFit, RefusesTooFewPoints) {
   NeighbourMoments moments;
   for (int i = 0; i < 4; ++i) moments.add({0.1 * (i % 2), 0.1 * (i / 2), 0.0});

@@ -119,7 +119,7 @@ TEST(Degeneracy, FindsTheDirectionThatNoPlaneSees) {
     h << Eigen::Vector3d(x, y, z).cross(normal), normal;
     sensitivity += h * h.transpose() / kPoints;
   }
-  const DegeneracyAnalysis analysis = analyse_degeneracy(sensitivity, 4.0, 0.004);
+  const DegeneracyAnalysis analysis = analyse_degeneracy(sensitivity, Matrix6d::Zero(), {4.0, 0.004, 1.6});
   EXPECT_EQ(analysis.degenerate_directions, 1);
   Vector6d along_z = Vector6d::Zero();
   along_z[5] = 1.0;

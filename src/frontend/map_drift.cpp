@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/map_drift.h"
+
+#include <algorithm>
+
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+/// Takes an error of (attitude in body axes, position in odom axes) to one with both in odom axes.
+Matrix6d attitude_to_odom(const Pose& T_odom_body) {
+  Matrix6d turn = Matrix6d::Identity();
+  turn.topLeftCorner<3, 3>() = T_odom_body.rotation.toRotationMatrix();
+  return turn;
+}
+
+}  // namespace
+
+void MapDrift::begin(const Eigen::Matrix3d& attitude_covariance_body, const Pose& T_odom_body) {
+  const Eigen::Matrix3d R = T_odom_body.rotation.toRotationMatrix();
+  covariance_.setZero();
+  covariance_.topLeftCorner<3, 3>() = R * attitude_covariance_body * R.transpose();
+  position_ = T_odom_body.translation;
+}
+
+void MapDrift::add_scan(const Matrix15d& covariance, const Pose& T_odom_body, double age_scans) {
+  const Matrix6d turn = attitude_to_odom(T_odom_body);
+  covariance_ = at(T_odom_body.translation);
+  covariance_ += scale_ / std::max(age_scans, 1.0) * turn * covariance.topLeftCorner<6, 6>() * turn.transpose();
+  position_ = T_odom_body.translation;
+}
+
+Matrix15d MapDrift::add_to(const Matrix15d& covariance, const Pose& T_odom_body) const {
+  const Matrix6d turn = attitude_to_odom(T_odom_body);
+  Matrix15d sum = covariance;
+  sum.topLeftCorner<6, 6>() += turn.transpose() * at(T_odom_body.translation) * turn;
+  return sum;
+}
+
+Matrix6d MapDrift::at(const Eigen::Vector3d& position) const {
+  // A map that is turned by phi shifts what lies d further on by phi x d.
+  Matrix6d carry = Matrix6d::Identity();
+  carry.bottomLeftCorner<3, 3>() = -so3::skew(position - position_);
+  return carry * covariance_ * carry.transpose();
+}
+
+}  // namespace ignis

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "common/pose.h"
+#include "frontend/eskf.h"
+
+namespace ignis {
+
+/// How uncertain the local map itself is against the frame that the drive began in.
+///
+/// The filter's covariance is that of the pose in the map: each scan measures the pose against points that were placed
+/// by earlier poses, so their common error never shows in a residual. Without this part the covariance of a drive of a
+/// kilometre equals that of standing still.
+///
+/// A scan that enters the map carries the error of its pose with it. When the map's points are on average `age` scans
+/// old, a share of 1 / age of that error stays for good: e_k = mean(e_j over the last 2 x age scans) + n_k is a random
+/// walk with a step of n_k / age. Scans that meet the same planes share the planes' errors for about `age` scans, so
+/// the steps are not independent, and the variance of the walk grows by that number: by (covariance of the pose in the
+/// map) / age per scan. The same rule hands over what grew along a direction that no scan observed: once structure
+/// comes back into view, the filter's covariance shrinks against a map that was shifted along with the pose, and the
+/// shift stays.
+///
+/// Kept as the covariance of (turn of the map about the body, shift), both in odom axes, at the present position.
+class MapDrift {
+ public:
+  /// `scale`: factor on the variance that a scan leaves behind.
+  explicit MapDrift(double scale) : scale_(scale) {}
+
+  /// Begins with what gravity says about the attitude: body axes, [rad^2].
+  void begin(const Eigen::Matrix3d& attitude_covariance_body, const Pose& T_odom_body);
+
+  /// A scan entered the map at a pose that is known in the map with `covariance` (order of ErrorBlock).
+  void add_scan(const Matrix15d& covariance, const Pose& T_odom_body, double age_scans);
+
+  /// The filter's covariance plus this one, at a pose.
+  [[nodiscard]] Matrix15d add_to(const Matrix15d& covariance, const Pose& T_odom_body) const;
+
+ private:
+  [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
+
+  double scale_;
+  Matrix6d covariance_ = Matrix6d::Zero();
+  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< where covariance_ is meant
+};
+
+}  // namespace ignis

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/trust_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <format>
+
+namespace ignis {
+namespace {
+
+constexpr int kScansUntilDegraded = 5;     // without a correction
+constexpr double kSecondsUntilLost = 2.0;  // without a correction
+constexpr double kSilentImuSeconds = 0.1;  // of scan time
+constexpr int kScansToConfirm = 10;        // applied ones, after silence or a loss
+constexpr double kOpinionSeconds = 2.0;    // over which scans and IMU are compared
+constexpr double kMaxDisagreement = 8.0;   // sigma
+
+}  // namespace
+
+void TrustMonitor::note_imu(Utime utime) {
+  if (newest_imu_ && seconds_without_imu() > kSilentImuSeconds) scans_to_confirm_ = kScansToConfirm;
+  newest_imu_ = newest_imu_ ? std::max(*newest_imu_, utime) : utime;
+}
+
+void TrustMonitor::note_arrival(Utime scan_end) {
+  newest_scan_ = newest_scan_ ? std::max(*newest_scan_, scan_end) : scan_end;
+}
+
+void TrustMonitor::note_scan(const ScanEvidence& evidence) {
+  const ScanStats& stats = evidence.stats;
+  note_arrival(stats.utime);
+  position_sigma_ = evidence.position_sigma;
+  accel_bias_sigma_ = evidence.accel_bias_sigma;
+  last_reason_ = text(stats.reason);
+  if (!last_applied_) last_applied_ = stats.utime;
+  corrections_.push_back({stats.utime, evidence.velocity_correction});
+  while (seconds_between(corrections_.front().utime, stats.utime) > kOpinionSeconds) corrections_.pop_front();
+  // The first scan has no map to agree with: that is a beginning, not a fault.
+  if (stats.reason == ScanReason::kMapEmpty) return;
+  if (!stats.applied()) {
+    ++scans_since_applied_;
+    return;
+  }
+  last_applied_ = stats.utime;
+  scans_since_applied_ = 0;
+  scans_to_confirm_ = std::max(scans_to_confirm_ - 1, 0);
+  if (scans_to_confirm_ == 0) lost_ = false;
+}
+
+void TrustMonitor::note_loss() {
+  lost_ = true;
+  ++losses_;
+  scans_to_confirm_ = kScansToConfirm;
+  corrections_.clear();
+}
+
+double TrustMonitor::seconds_without_imu() const {
+  return newest_imu_ && newest_scan_ ? seconds_between(*newest_imu_, *newest_scan_) : 0.0;
+}
+
+double TrustMonitor::seconds_without_scan() const {
+  return last_applied_ && newest_scan_ ? seconds_between(*last_applied_, *newest_scan_) : 0.0;
+}
+
+double TrustMonitor::disagreement() const {
+  if (corrections_.size() < 2) return 0.0;
+  const double seconds = seconds_between(corrections_.front().utime, corrections_.back().utime);
+  if (seconds < 0.5 * kOpinionSeconds) return 0.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Correction& correction : corrections_) sum += correction.velocity;
+  // A tilt error acts like a bias; its prior bounds what either can do.
+  const double bias = std::max(accel_bias_sigma_, 0.5 * config_.accel_bias_sigma) * seconds;
+  const double white = config_.imu_noise_accel * std::sqrt(seconds);
+  return sum.norm() / std::hypot(bias, white);
+}
+
+Trust TrustMonitor::trust() const {
+  if (lost_ || position_sigma_ > config_.lost_sigma_m) return Trust::kLost;
+  if (scans_since_applied_ >= kScansUntilDegraded && seconds_without_scan() > kSecondsUntilLost) return Trust::kLost;
+  if (scans_since_applied_ >= kScansUntilDegraded || position_sigma_ > config_.degraded_sigma_m ||
+      seconds_without_imu() > kSilentImuSeconds || scans_to_confirm_ > 0 || disagreement() > kMaxDisagreement) {
+    return Trust::kDegraded;
+  }
+  return Trust::kOk;
+}
+
+std::string TrustMonitor::reason() const {
+  if (lost_)
+    return std::format("lost: scans contradicted the map, a new one was begun ({} applied scans to go)",
+                       scans_to_confirm_);
+  if (position_sigma_ > config_.degraded_sigma_m) {
+    return std::format("position sigma {:.2f} m (limit {:.2f}): a direction is not observed", position_sigma_,
+                       config_.degraded_sigma_m);
+  }
+  if (scans_since_applied_ >= kScansUntilDegraded) return std::format("no scan applied: {}", last_reason_);
+  if (seconds_without_imu() > kSilentImuSeconds) {
+    return std::format("no IMU data for {:.1f} s, going on with scans alone", seconds_without_imu());
+  }
+  if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
+  if (disagreement() > kMaxDisagreement) {
+    return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),
+                       kOpinionSeconds);
+  }
+  return losses_ > 0 ? std::format("OK, found again after {} losses", losses_) : "OK";
+}
+
+}  // namespace ignis

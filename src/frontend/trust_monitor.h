@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "common/time.h"
+#include "frontend/frontend_config.h"
+#include "frontend/scan_stats.h"
+
+namespace ignis {
+
+/// How far the pose can be relied on. Values and order are those of lcmtypes/health_t.lcm.
+enum class Trust : std::int8_t { kOk = 0, kDegraded = 1, kLost = 2 };
+
+/// What one scan did to the filter, as far as trust is concerned.
+struct ScanEvidence {
+  ScanStats stats;
+  double position_sigma = 0.0;                                    ///< [m] largest of the position in the map
+  Eigen::Vector3d velocity_correction = Eigen::Vector3d::Zero();  ///< [m/s] odom axes, zero when not applied
+  double accel_bias_sigma = 0.0;                                  ///< [m/s^2] largest axis
+};
+
+/// Judges from scans and stamps alone whether the pose may be trusted, and says why not.
+///
+/// One of the signals is a second opinion: returns that travel with the vehicle, or a tunnel that looks the same
+/// everywhere, give well-conditioned scans that all say "no motion". Each such scan takes a little of the velocity that
+/// the IMU has found. Corrections of a healthy filter cancel out; the sum over two seconds is compared with what
+/// accelerometer noise and bias can explain.
+class TrustMonitor {
+ public:
+  explicit TrustMonitor(const FrontendConfig& config) : config_(config) {}
+
+  /// A real IMU sample arrived.
+  void note_imu(Utime utime);
+  /// A scan arrived, used or not: time goes on.
+  void note_arrival(Utime scan_end);
+  /// A scan was processed.
+  void note_scan(const ScanEvidence& evidence);
+  /// The local map was given up; from here on the pose says nothing about where the vehicle was before.
+  void note_loss();
+
+  [[nodiscard]] Trust trust() const;
+  /// Why the trust is not kOk; what happened last when it is.
+  [[nodiscard]] std::string reason() const;
+  /// [sigma] by which scans and IMU disagree about the last two seconds.
+  [[nodiscard]] double disagreement() const;
+
+ private:
+  struct Correction {
+    Utime utime;
+    Eigen::Vector3d velocity;
+  };
+
+  [[nodiscard]] double seconds_without_imu() const;
+  [[nodiscard]] double seconds_without_scan() const;
+
+  FrontendConfig config_;
+  std::optional<Utime> newest_imu_;
+  std::optional<Utime> newest_scan_;
+  std::optional<Utime> last_applied_;
+  std::string last_reason_;
+  int scans_since_applied_ = 0;
+  int scans_to_confirm_ = 0;  ///< that have to be applied before the trust comes back
+  bool lost_ = false;
+  int losses_ = 0;
+  double position_sigma_ = 0.0;
+  double accel_bias_sigma_ = 0.0;
+  std::deque<Correction> corrections_;
+};
+
+}  // namespace ignis

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Faults of the streams that the odometry has to survive, by their numbers in the fault list.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/lio.h"
+#include "frontend/lio_runner.h"
+
+namespace ignis {
+namespace {
+
+using test::Drive;
+using test::Sensors;
+
+/// 16 s through the hall, the first two at rest.
+const Drive& drive() {
+  static const Drive simulated =
+      test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 16.0, Sensors{}, 7);
+  return simulated;
+}
+
+/// Feeds a drive and notes the trust after each scan that arrives.
+struct Watched {
+  Lio lio;
+  std::vector<ScanResult> scans;
+  std::vector<std::pair<Utime, Trust>> trust;  ///< after each arrival
+
+  explicit Watched(const Drive& input, const FrontendConfig& config = test::tuned_config()) : lio(config) {
+    // Corrupt stamps must not decide what arrives when: nothing arrives more than a tenth of a second after the last.
+    auto imu = input.imu.begin();
+    Utime now = input.imu.front().utime;
+    for (const Scan& scan : input.scans) {
+      now = std::min(scan.end_utime(), now + 100'000);
+      while (imu != input.imu.end() && (imu->utime <= now || imu->utime > now + 60 * kMicrosPerSecond)) {
+        take(lio.add_imu(*imu++).scans);
+      }
+      take(lio.add_scan(scan));
+      trust.emplace_back(scan.end_utime(), lio.status().trust);
+    }
+  }
+
+  void take(std::vector<ScanResult> results) {
+    for (ScanResult& result : results) scans.push_back(std::move(result));
+  }
+
+  [[nodiscard]] Trust trust_at(double seconds) const {
+    const Utime utime = drive().imu.front().utime + to_micros(seconds);
+    return std::ranges::lower_bound(trust, utime, {}, [](const auto& each) { return each.first; })->second;
+  }
+
+  [[nodiscard]] double error_at_end() const {
+    const NavState& last = scans.back().state;
+    return (last.T_odom_body.translation - drive().truth(test::drive_seconds(drive(), last.utime)).translation).norm();
+  }
+};
+
+std::vector<ImuSample>::iterator sample_at(Drive& input, double seconds) {
+  return std::ranges::lower_bound(input.imu, input.imu.front().utime + to_micros(seconds), {}, &ImuSample::utime);
+}
+
+TEST(Fault_F2, ImuGoneForThreeSecondsIsBridgedByScansAndAnnounced) {
+  Drive input = drive();
+  input.imu.erase(sample_at(input, 8.0), sample_at(input, 11.0));
+  const Watched run(input);
+  EXPECT_EQ(run.trust_at(7.9), Trust::kOk);
+  EXPECT_EQ(run.trust_at(8.2), Trust::kDegraded);
+  EXPECT_EQ(run.trust_at(10.9), Trust::kDegraded);
+  EXPECT_EQ(run.trust_at(12.2), Trust::kOk) << "ten scans and the settling of the filter after its return";
+  EXPECT_GT(run.lio.imu_counters().coasted, 200);
+  EXPECT_LT(run.error_at_end(), 0.3) << "2 % of the 3 m in the gap, and the tilt of the start";
+  for (const ScanResult& scan : run.scans) {
+    if (scan.keyframe && scan.state.utime > sample_at(input, 8.3)->utime &&
+        scan.state.utime < sample_at(input, 10.9)->utime) {
+      EXPECT_FALSE(scan.keyframe->imu_complete) << "made-up samples are no measurement";
+    }
+  }
+}
+
+TEST(Fault_F3, AClippedAxisTeachesTheBiasesNothing) {
+  Drive input = drive();
+  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
+    sample->accel.x() = 25.0;
+    sample->saturated = true;
+  }
+  const Watched run(input);
+  const auto state_at = [&](double seconds) {
+    const Utime utime = input.imu.front().utime + to_micros(seconds);
+    return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
+  };
+  EXPECT_EQ((state_at(9.0).accel_bias - state_at(7.95).accel_bias).norm(), 0.0);
+  EXPECT_GT((state_at(9.5).accel_bias - state_at(7.95).accel_bias).norm(), 0.0) << "one second later it learns again";
+  for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
+  EXPECT_LT(run.error_at_end(), 0.3);
+}
+
+TEST(Fault_F9, AStampOfTheFarFutureBlocksNothing) {
+  Drive input = drive();
+  ImuSample future = *sample_at(input, 8.0);
+  future.utime += 3'600'000'000;
+  Scan far = input.scans[170];
+  far.utime += 3'600'000'000;
+  input.imu.insert(sample_at(input, 8.0), future);
+  input.scans.insert(input.scans.begin() + 170, far);
+  const Watched run(input);
+  EXPECT_EQ(run.lio.imu_counters().leaps, 1);
+  EXPECT_EQ(
+      std::ranges::count_if(run.scans, [](const ScanResult& r) { return r.stats.reason == ScanReason::kBadStamp; }), 1);
+  EXPECT_TRUE(run.scans.back().stats.applied());
+  EXPECT_LT(run.error_at_end(), 0.2);
+}
+
+TEST(Fault_F11, BeingCarriedElsewhereIsALossANewSessionAndAFind) {
+  // From one scan on all ranges are 6 % too long: nothing fits the old map, but the new scans fit one another.
+  Drive input = drive();
+  for (std::size_t i = 160; i < input.scans.size(); ++i) {
+    for (ScanPoint& point : input.scans[i].points) point.position *= 1.06F;
+  }
+  const Watched run(input, FrontendConfig{});
+  const auto lost = std::ranges::find(run.trust, Trust::kLost, [](const auto& each) { return each.second; });
+  ASSERT_NE(lost, run.trust.end());
+  EXPECT_LE(lost - run.trust.begin(), 160 + 21) << "within a second";
+  EXPECT_EQ(run.trust.back().second, Trust::kOk);
+  EXPECT_NE(run.lio.status().reason.find("found again"), std::string::npos);
+  EXPECT_GE(run.lio.session(), 1);
+  const auto keyframe =
+      std::ranges::find_if(run.scans, [](const ScanResult& r) { return r.keyframe && r.keyframe->session > 0; });
+  ASSERT_NE(keyframe, run.scans.end());
+  EXPECT_EQ(keyframe->keyframe->id, 0) << "keyframes of the new session begin anew";
+}
+
+}  // namespace
+}  // namespace ignis

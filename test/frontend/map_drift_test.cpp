@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/map_drift.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+const Pose kStart{so3::exp({0.1, -0.2, 0.05}), {1.0, 2.0, 3.0}};
+
+Matrix15d published(const MapDrift& drift, const Pose& pose) { return drift.add_to(Matrix15d::Zero(), pose); }
+
+TEST(MapDrift, AStartThatIsNotLevelTiltsAllThatFollows) {
+  MapDrift drift(1.0);
+  constexpr double kTilt = 0.01;
+  drift.begin(kTilt * kTilt * Eigen::Matrix3d::Identity(), kStart);
+  Pose far = kStart;
+  far.translation.z() -= 20.0;
+  const Matrix15d covariance = published(drift, far);
+  EXPECT_NEAR(std::sqrt(covariance(kPosition, kPosition)), 20.0 * kTilt, 1e-9);
+  EXPECT_NEAR(std::sqrt(covariance(kPosition + 1, kPosition + 1)), 20.0 * kTilt, 1e-9);
+  EXPECT_NEAR(covariance(kPosition + 2, kPosition + 2), 0.0, 1e-12) << "a turn does not stretch the way";
+  EXPECT_NEAR(std::sqrt(covariance(kAttitude, kAttitude)), kTilt, 1e-9);
+}
+
+TEST(MapDrift, CovarianceMatchesSampledTurnsAndShiftsOfTheMap) {
+  const Eigen::Vector3d sigma(0.01, 0.02, 0.015);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const Pose later{so3::exp({0.3, 1.2, -0.1}), {5.0, 1.0, -9.0}};
+  Matrix6d sampled = Matrix6d::Zero();
+  constexpr int kSamples = 20000;
+  for (int i = 0; i < kSamples; ++i) {
+    const double x = normal(random);
+    const double y = normal(random);
+    const double z = normal(random);
+    const Eigen::Vector3d turn_body = sigma.cwiseProduct(Eigen::Vector3d(x, y, z));
+    // The first pose is off by a turn, and the whole map with it.
+    Pose wrong = kStart;
+    wrong.rotation = kStart.rotation * so3::exp(turn_body);
+    const Pose moved = wrong * (kStart.inverse() * later);
+    Vector6d error;
+    error << so3::log(later.rotation.conjugate() * moved.rotation), moved.translation - later.translation;
+    sampled += error * error.transpose() / kSamples;
+  }
+  MapDrift drift(1.0);
+  drift.begin(sigma.cwiseAbs2().asDiagonal(), kStart);
+  const Matrix6d expected = published(drift, later).topLeftCorner<6, 6>();
+  EXPECT_LT((sampled - expected).norm(), 0.05 * expected.norm());
+}
+
+TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
+  MapDrift drift(2.0);
+  drift.begin(Eigen::Matrix3d::Zero(), kStart);
+  Matrix15d covariance = 1e-6 * Matrix15d::Identity();
+  covariance(kPosition + 2, kPosition + 2) = 1e-2;  // not observed
+  drift.add_scan(covariance, kStart, 10.0);
+  EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 / 10.0, 1e-12);
+  EXPECT_NEAR(published(drift, kStart)(kPosition + 2, kPosition + 2), 2.0 * 1e-2 / 10.0, 1e-9);
+  EXPECT_NEAR(published(drift, kStart)(kAttitude, kAttitude), 2.0 * 1e-6 / 10.0, 1e-12);
+  drift.add_scan(covariance, kStart, 0.0);
+  EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 * 1.1, 1e-12) << "at least one scan old";
+}
+
+}  // namespace
+}  // namespace ignis

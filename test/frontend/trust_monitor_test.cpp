@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/trust_monitor.h"
+
+#include <gtest/gtest.h>
+
+namespace ignis {
+namespace {
+
+/// A monitor that sees IMU and scans go by at 20 Hz.
+class Feed {
+ public:
+  TrustMonitor monitor{FrontendConfig{}};
+  bool imu = true;
+  ScanEvidence evidence;
+
+  Feed() {
+    evidence.stats.reason = ScanReason::kApplied;
+    evidence.position_sigma = 0.01;
+    evidence.accel_bias_sigma = 0.05;
+    run(20);
+  }
+
+  void run(int scans) {
+    for (int i = 0; i < scans; ++i) {
+      now_ += 50'000;
+      if (imu) monitor.note_imu(now_);
+      evidence.stats.utime = now_;
+      monitor.note_scan(evidence);
+    }
+  }
+
+ private:
+  Utime now_ = 1'000'000'000;
+};
+
+void expect(const TrustMonitor& monitor, Trust trust, const std::string& words) {
+  EXPECT_EQ(monitor.trust(), trust);
+  EXPECT_NE(monitor.reason().find(words), std::string::npos) << monitor.reason();
+}
+
+TEST(TrustMonitor, IsOkWhileScansAgree) {
+  const Feed feed;
+  expect(feed.monitor, Trust::kOk, "OK");
+}
+
+TEST(TrustMonitor, FiveScansWithoutACorrectionDegradeAndTwoSecondsLose) {
+  Feed feed;
+  feed.evidence.stats.reason = ScanReason::kTooFewMatches;
+  feed.run(4);
+  EXPECT_EQ(feed.monitor.trust(), Trust::kOk);
+  feed.run(1);
+  expect(feed.monitor, Trust::kDegraded, "too few points found a plane");
+  feed.run(36);
+  expect(feed.monitor, Trust::kLost, "no scan applied");
+  feed.evidence.stats.reason = ScanReason::kApplied;
+  feed.run(1);
+  EXPECT_EQ(feed.monitor.trust(), Trust::kOk);
+}
+
+TEST(TrustMonitor, APoseThatIsNotKnownIsNotOk) {
+  Feed feed;
+  feed.evidence.position_sigma = 0.2;
+  feed.run(1);
+  expect(feed.monitor, Trust::kDegraded, "position sigma 0.20 m");
+  feed.evidence.position_sigma = 1.1;
+  feed.run(1);
+  EXPECT_EQ(feed.monitor.trust(), Trust::kLost);
+}
+
+TEST(TrustMonitor, ASilentImuDegradesWithin100MsAndIsForgivenTenScansAfterItsReturn) {
+  Feed feed;
+  feed.imu = false;
+  feed.run(2);
+  EXPECT_EQ(feed.monitor.trust(), Trust::kOk) << "100 ms";
+  feed.run(1);
+  expect(feed.monitor, Trust::kDegraded, "no IMU data for 0.1 s");
+  feed.imu = true;
+  feed.run(9);
+  expect(feed.monitor, Trust::kDegraded, "IMU data are back");
+  feed.run(1);
+  EXPECT_EQ(feed.monitor.trust(), Trust::kOk);
+}
+
+TEST(TrustMonitor, ALossIsAnnouncedAndSoIsBeingFoundAgain) {
+  Feed feed;
+  feed.monitor.note_loss();
+  feed.run(9);
+  expect(feed.monitor, Trust::kLost, "a new one was begun");
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "found again after 1 loss");
+}
+
+TEST(TrustMonitor, ScansThatKeepTakingTheVelocityAwayAreContradictedByTheImu) {
+  Feed feed;
+  // The vehicle accelerates at 1.5 m/s^2 among returns that move with it.
+  feed.evidence.velocity_correction = {0.0, 0.0, 0.075};
+  feed.run(45);
+  expect(feed.monitor, Trust::kDegraded, "disagree");
+  EXPECT_GT(feed.monitor.disagreement(), 8.0);
+}
+
+TEST(TrustMonitor, CorrectionsThatCancelOutAreNoContradiction) {
+  Feed feed;
+  for (int i = 0; i < 60; ++i) {
+    feed.evidence.velocity_correction = Eigen::Vector3d(0.0, 0.0, i % 2 == 0 ? 0.075 : -0.075);
+    feed.run(1);
+  }
+  EXPECT_EQ(feed.monitor.trust(), Trust::kOk);
+}
+
+}  // namespace
+}  // namespace ignis
