@@ -69,7 +69,7 @@ def _machine(peers_versions: str) -> str:
     return (
         f"{cpu.partition(':')[2].strip()}, {os.cpu_count()} cores, Linux {platform.release()}; every system on one "
         f"thread of the same core, one at a time; medians over seeds. Peers: {peers_versions}, with the settings in "
-        "python/ignis/benching/peer_runner.py: ours, not their authors'. A peer that fails here may do better with others."
+        "python/ignis/benching/peer_runner.py: ours, not their authors'. One that fails may do better with others."
     )
 
 
