@@ -24,7 +24,6 @@ class SensorSession {
 
   [[nodiscard]] l1::HostFrames& frames() { return frames_; }
   [[nodiscard]] const l1::PacketStream& stream() const { return stream_; }
-  [[nodiscard]] const DriverConfig& config() const { return config_; }
   /// Says what the link has brought so far, for messages about a sensor that does not answer.
   [[nodiscard]] std::string what_came() const;
 

@@ -182,7 +182,6 @@ ScanResult Lio::process(const Scan& scan) {
   }
   if (match.stats.applied()) ++applied_scans_;
   note_evidence(predicted, match.stats, scan);
-  match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(scan, match.stats.reason, cloud);
   grow_map(cloud, match.stats.reason);
 

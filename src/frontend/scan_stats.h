@@ -52,9 +52,8 @@ struct ScanStats {
   Eigen::Vector3d observability = Eigen::Vector3d::Zero();  ///< diagonal of sum(n n^T) over its trace, world axes
   int degenerate_directions = 0;                            ///< eigen-directions left to the IMU
   std::string unobserved;                                   ///< these directions in words, see describe()
-  double imu_disagreement = 0.0;  ///< [sigma] between scan motion and IMU motion over two seconds, see TrustMonitor
-  Pose T_odom_body;               ///< after this scan
-  int map_points = 0;             ///< in the local map, after this scan
+  Pose T_odom_body;                                         ///< after this scan
+  int map_points = 0;                                       ///< in the local map, after this scan
 
   [[nodiscard]] bool applied() const { return reason == ScanReason::kApplied; }
 };

@@ -219,5 +219,32 @@ TEST(L1DecoderTime, StampsGoOnForwardsWhenTheSensorRestarts) {
   EXPECT_NEAR(static_cast<double>(last - newest_before), 10e6, 2000.0);
 }
 
+TEST(L1DecoderTime, StampsFollowTheNewPhaseWhenTheSensorRestarts) {
+  // The new counters lie 1.5 ms late on the old line, which remembers its earliest arrivals for ten seconds.
+  constexpr double kFirstRunS = 9.0;
+  constexpr double kSecondRunS = 2.0;
+  constexpr double kSettledUs = 500'000.0;
+  constexpr double kRestartUs = kFirstRunS * 1e6 + 1e6 + 1500.0;
+  const Sensor sensor;
+  L1Decoder decoder(DriverConfig{}, l1_extrinsics());
+  std::int64_t samples = 0;
+  double worst = 0.0;
+  for (const double offset : {0.0, kRestartUs}) {
+    samples = 0;
+    for (const WireFrame& frame : sensor.run(offset == 0.0 ? kFirstRunS : kSecondRunS)) {
+      for (const Event& event : decoder.feed(frame.bytes, std::llround(1e12 + offset + frame.begin_us + 500.0))) {
+        const auto* sample = std::get_if<ImuSample>(&event);
+        if (sample == nullptr) continue;
+        const double truth = sensor.imu_time(samples++);
+        if (offset == 0.0 || truth < kSettledUs) continue;
+        worst = std::max(worst, std::abs(static_cast<double>(sample->utime) - 1e12 - offset - truth));
+      }
+    }
+  }
+  EXPECT_EQ(samples, 500);
+  EXPECT_LT(worst, kTargetUs);
+  EXPECT_GE(decoder.counters().restarts, 1);
+}
+
 }  // namespace
 }  // namespace ignis::l1
