@@ -31,13 +31,46 @@ void write_scan_stats(const std::filesystem::path& file, const ReplayResult& res
   FileOutput output(file);
   output.stream() << "utime,scan_sequence,applied,reason,points,matched,used,mean_innovation_m,mean_residual_m,"
                      "correction_m,correction_rad,velocity_correction_m_s,observability_x,observability_y,"
-                     "observability_z,degenerate_directions,map_points\n";
+                     "observability_z,degenerate_directions,nis,nis_directions,standing,imu_disagreement,map_points\n";
   for (const ScanStats& s : result.scans) {
     output.stream() << std::format(
-        "{},{},{},\"{}\",{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{},{}\n", s.utime,
-        s.scan_sequence, s.applied() ? 1 : 0, text(s.reason), s.points, s.matched, s.used, s.mean_innovation,
+        "{},{},{},\"{}\",{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},{:.4f},{},{:.4f},{},{},{:.3f},{}\n",
+        s.utime, s.scan_sequence, s.applied() ? 1 : 0, text(s.reason), s.points, s.matched, s.used, s.mean_innovation,
         s.mean_residual, s.correction_m, s.correction_rad, s.velocity_correction, s.observability.x(),
-        s.observability.y(), s.observability.z(), s.degenerate_directions, s.map_points);
+        s.observability.y(), s.observability.z(), s.degenerate_directions, s.nis, s.nis_directions, s.standing ? 1 : 0,
+        s.imu_disagreement, s.map_points);
+  }
+  output.commit();
+}
+
+void append(std::string& row, const Eigen::Vector3d& values) {
+  for (const double value : values) row += std::format(",{:.9g}", value);
+}
+
+/// Velocity, biases and covariance on the stamps of eskf.tum. Columns p00 to p55: upper triangle of the pose's, row by
+/// row, attitude (body axes) then position (odom axes); sigma_*: roots of the other variances.
+void write_states(const std::filesystem::path& file, const ReplayResult& result) {
+  FileOutput output(file);
+  output.stream() << "utime";
+  for (const char* name : {"v", "gyro_bias", "accel_bias", "sigma_v", "sigma_gyro_bias", "sigma_accel_bias"}) {
+    for (const char axis : {'x', 'y', 'z'}) output.stream() << std::format(",{}_{}", name, axis);
+  }
+  for (int i = 0; i < 6; ++i) {
+    for (int k = i; k < 6; ++k) output.stream() << std::format(",p{}{}", i, k);
+  }
+  output.stream() << '\n';
+  for (const auto& [state, covariance] : result.states) {
+    std::string row = std::to_string(state.utime);
+    append(row, state.v_odom);
+    append(row, state.gyro_bias);
+    append(row, state.accel_bias);
+    for (const int block : {kVelocity, kGyroBias, kAccelBias}) {
+      append(row, covariance.diagonal().segment<3>(block).cwiseSqrt());
+    }
+    for (int i = 0; i < 6; ++i) {
+      for (int k = i; k < 6; ++k) row += std::format(",{:.9g}", covariance(i, k));
+    }
+    output.stream() << row << '\n';
   }
   output.commit();
 }
@@ -99,6 +132,8 @@ Json report(const runtime::Application& application, const std::filesystem::path
   json["scans"] = result.scans.size();
   json["scans_applied"] = applied_scans(result);
   json["scans_by_reason"] = scans_by_reason(result);
+  json["scans_with_unobserved_directions"] =
+      std::ranges::count_if(result.scans, [](const ScanStats& scan) { return scan.degenerate_directions > 0; });
   json["keyframes"] = result.smoother.keyframes;
   json["keyframes_without_imu"] = result.smoother.without_imu;
   json["loops_accepted"] = accepted;
@@ -164,6 +199,7 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const r
   write_pcd(folder / "map.pcd", pipeline.voxels());
   write_ply(folder / "map.ply", pipeline.voxels());
   write_scan_stats(folder / "scan_stats.csv", result);
+  write_states(folder / "eskf_states.csv", result);
   write_loops(folder / "loops.csv", result);
   write_text(folder / "config.json", print_config(application.config));
   const std::filesystem::path file = folder / "report.json";

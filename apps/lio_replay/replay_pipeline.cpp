@@ -33,6 +33,7 @@ void ReplayPipeline::take(const ScanResult& scan, double milliseconds) {
   result_.scan_times_ms.push_back(milliseconds);
   if (!scan.has_state) return;
   result_.odometry.push_back({scan.state.utime, scan.state.T_odom_body});
+  result_.states.push_back({scan.state, scan.covariance});
   if (scan.keyframe) take_keyframe(*scan.keyframe);
   map_timer_.time([&] { return map_.insert_scan(scan.cloud, scan.state.T_odom_body); });
 }

@@ -16,13 +16,20 @@
 
 namespace ignis {
 
+/// A state of the filter and its published covariance, order of ErrorBlock.
+struct UncertainState {
+  NavState state;
+  Matrix15d covariance;
+};
+
 /// Everything that a replay produces, before it becomes files.
 struct ReplayResult {
   std::vector<ScanStats> scans;
   std::vector<double> scan_times_ms;  ///< wall time of each scan in the front end
   std::vector<LoopResult> loops;
-  Trajectory odometry;  ///< one row per scan, frame odom
-  Trajectory smoothed;  ///< on the same stamps, frame map
+  Trajectory odometry;                 ///< one row per scan, frame odom
+  std::vector<UncertainState> states;  ///< on the same stamps
+  Trajectory smoothed;                 ///< on the same stamps, frame map
   PoseGraph graph;
   SmootherStats smoother;
   std::string start;  ///< what the front end says about its start

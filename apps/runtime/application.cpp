@@ -11,6 +11,7 @@ namespace {
 
 struct CommonOptions {
   std::string config_file;
+  std::vector<std::string> changes;
   std::string lcm_url;
   bool print_config = false;
   bool print_schema = false;
@@ -18,6 +19,8 @@ struct CommonOptions {
 
 void add_common_options(CLI::App& app, CommonOptions& options) {
   app.add_option("--config", options.config_file, "configuration file (default: built-in defaults)");
+  app.add_option("--set", options.changes, "section.key=value: wins over the configuration file; may be repeated")
+      ->allow_extra_args(false);
   app.add_option("--lcm-url", options.lcm_url, "LCM URL (default: LCM_DEFAULT_URL, then lcm.url of the configuration)");
   app.add_flag("--print-config", options.print_config, "print the effective configuration and end");
   app.add_flag("--print-schema", options.print_schema, "print the JSON schema of the configuration and end");
@@ -25,7 +28,7 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
 }
 
 IgnisConfig effective_config(const CommonOptions& options) {
-  IgnisConfig config = options.config_file.empty() ? IgnisConfig{} : load_config(options.config_file);
+  IgnisConfig config = load_config(options.config_file, options.changes);
   if (!options.lcm_url.empty()) {
     config.lcm.url = options.lcm_url;
   } else if (const char* environment = std::getenv("LCM_DEFAULT_URL"); environment != nullptr && *environment != '\0') {

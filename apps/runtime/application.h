@@ -32,9 +32,9 @@ struct Application {
   std::string config_hash;
 };
 
-/// The frame of every main: reads the command line (--config, --lcm-url, --print-config, --print-schema, --version and
-/// what `add_options` adds) and the configuration, catches stop signals, runs `body` and turns errors into one line on
-/// the error stream and an exit code.
+/// The frame of every main: reads the command line (--config, --set, --lcm-url, --print-config, --print-schema,
+/// --version and what `add_options` adds) and the configuration, catches stop signals, runs `body` and turns errors
+/// into one line on the error stream and an exit code.
 int run_application(const std::string& name, const std::string& description, int argc, char** argv,
                     const std::function<void(CLI::App&)>& add_options,
                     const std::function<ExitCode(const Application&)>& body);

@@ -5,12 +5,15 @@
 
 namespace ignis::runtime {
 
-IgnisConfig load_config(const std::filesystem::path& file) {
+IgnisConfig load_config(const std::filesystem::path& file, const std::vector<std::string>& changes) {
   try {
-    return config::load<IgnisConfig>(config::read_json(file));
+    config::Json json = file.empty() ? config::Json::object() : config::read_json(file);
+    config::Offences offences;
+    for (const std::string& change : changes) config::assign(json, change, offences);
+    return config::load<IgnisConfig>(json, std::move(offences));
   } catch (const config::ConfigError& error) {
     const std::string text = error.what();
-    if (text.starts_with(file.string())) throw;
+    if (file.empty() || text.starts_with(file.string())) throw;
     throw config::ConfigError(file.string() + ": " + text);
   }
 }

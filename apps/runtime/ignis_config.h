@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "backend/backend_config.h"
 #include "common/config_json.h"
@@ -50,8 +52,9 @@ struct IgnisConfig {
   }
 };
 
-/// Reads, checks and returns a configuration; throws config::ConfigError with every offence.
-[[nodiscard]] IgnisConfig load_config(const std::filesystem::path& file);
+/// Reads, checks and returns a configuration; throws config::ConfigError with every offence. `changes` are assignments
+/// "section.key=value" that win over the file; an empty file name stands for the built-in defaults.
+[[nodiscard]] IgnisConfig load_config(const std::filesystem::path& file, const std::vector<std::string>& changes = {});
 
 /// The effective configuration, as --print-config shows it.
 [[nodiscard]] std::string print_config(const IgnisConfig& config);

@@ -2,8 +2,10 @@
 """How commands fail: one clear sentence on stderr and an exit code, never a traceback for what a user can cause."""
 
 import signal
+import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 EXIT_FAILURE = 1
 EXIT_BAD_INPUT = 2
@@ -29,3 +31,11 @@ def run_command(body: Callable[[], int | None]) -> int:
     except OSError as error:
         print(f"ignis: {error.filename or 'input or output'}: {error.strerror or error}", file=sys.stderr)
         return EXIT_FAILURE
+
+
+def run_quietly(command: Sequence[Any]) -> None:
+    """Runs a program whose output matters only when it fails; then its last line becomes the message."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise InputError(f"{command[0]} ended with code {done.returncode}: {last}")

@@ -61,6 +61,31 @@ Json read_json(const std::filesystem::path& file) {
   return parse_json({std::istreambuf_iterator<char>(stream), {}}, file.string());
 }
 
+void assign(Json& object, const std::string& assignment, Offences& offences) {
+  const std::size_t equals = assignment.find('=');
+  const std::string path = assignment.substr(0, equals);
+  const std::string value = equals == std::string::npos ? "" : assignment.substr(equals + 1);
+  Json* place = &object;
+  std::size_t begin = 0;
+  bool valid = equals != std::string::npos && !value.empty();
+  while (valid) {
+    const std::size_t dot = path.find('.', begin);
+    const std::string key = path.substr(begin, dot - begin);
+    valid = !key.empty() && place->is_object();
+    if (!valid) break;
+    place = &(*place)[key];
+    if (dot == std::string::npos) break;
+    if (place->is_null()) *place = Json::object();
+    begin = dot + 1;
+  }
+  if (!valid) {
+    offences.push_back({"--set", assignment, "section.key=value"});
+    return;
+  }
+  Json parsed = Json::parse(value, nullptr, false);
+  *place = parsed.is_discarded() ? Json(value) : std::move(parsed);
+}
+
 std::string nearest_word(const std::string& word, const std::set<std::string>& known) {
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;

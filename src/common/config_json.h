@@ -22,6 +22,10 @@ using Json = nlohmann::ordered_json;
 /// Reads and parses a file. Throws ConfigError when it is missing, a folder, unreadable or not JSON.
 [[nodiscard]] Json read_json(const std::filesystem::path& file);
 
+/// Sets one value of a nested object from an assignment "section.key=value"; sections that are missing are made. The
+/// value is read as JSON, and as a text where it is none. Anything that is no assignment becomes an offence.
+void assign(Json& object, const std::string& assignment, Offences& offences);
+
 /// The entry of `known` that is nearest to `word` by edit distance, or an empty text when none is near.
 [[nodiscard]] std::string nearest_word(const std::string& word, const std::set<std::string>& known);
 
@@ -244,11 +248,11 @@ class SchemaWriter {
   Json properties_ = Json::object();
 };
 
-/// Loads and validates a struct from a JSON object; throws one ConfigError with every offence.
+/// Loads and validates a struct from a JSON object; throws one ConfigError with every offence, those included that were
+/// found before.
 template <class Section>
-[[nodiscard]] Section load(const Json& object) {
+[[nodiscard]] Section load(const Json& object, Offences offences = {}) {
   Section value;
-  Offences offences;
   Loader(object, offences).visit(value);
   Validator(offences).visit(value);
   if (!offences.empty()) throw ConfigError(offences);

@@ -81,22 +81,16 @@ std::vector<Segment> motion(const Scan& scan, const NavState& end, std::span<con
   return segments;
 }
 
-bool in_range(const Eigen::Vector3f& point, const FrontendConfig& config) {
-  const double range2 = point.cast<double>().squaredNorm();
-  return range2 >= config.min_range_m * config.min_range_m && range2 <= config.max_range_m * config.max_range_m;
-}
-
 }  // namespace
 
 std::vector<CloudPoint> deskew(const Scan& scan, const NavState& state_at_end, std::span<const ImuSample> samples,
-                               const FrontendConfig& config) {
+                               double gravity_m) {
   std::vector<CloudPoint> cloud;
   cloud.reserve(scan.points.size());
   const std::vector<Segment> segments =
-      samples.empty() ? std::vector<Segment>{} : motion(scan, state_at_end, samples, config.gravity_m);
+      samples.empty() ? std::vector<Segment>{} : motion(scan, state_at_end, samples, gravity_m);
   std::size_t current = 0;
   for (const ScanPoint& point : scan.points) {
-    if (!point.position.allFinite() || !in_range(point.position, config)) continue;
     Eigen::Vector3f position = point.position;
     if (!segments.empty()) {
       const Utime utime = scan.utime + std::clamp(point.dt_us, 0, scan.duration_us);

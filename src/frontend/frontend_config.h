@@ -71,6 +71,11 @@ struct FrontendConfig {
   double keyframe_max_seconds = 5.0;
   double keyframe_cloud_seconds = 1.0;
   double max_scan_delay_s = 2.0;
+  double scan_voxel_m = 0.0;
+  bool deskew = true;
+  bool project_degenerate = true;
+  bool quarantine = true;
+  double zero_velocity_sigma = 0.01;
   double stationary_speed = 0.05;
 
   void visit_fields(this auto& self, auto& visit) {
@@ -191,7 +196,7 @@ struct FrontendConfig {
     visit.integer("min_scan_points", self.min_scan_points, {1, 100000}, "points", "fewer: the scan is skipped");
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
     visit.integer("max_scan_points", self.max_scan_points, {100, 200000}, "points",
-                  "larger scans are thinned to this before matching");
+                  "larger scans are thinned, and matched with at most so many");
     visit.integer("reanchor_scans", self.reanchor_scans, {1, 10000}, "scans",
                   "contradicting scans in a row after which the local map is begun anew");
     visit.number("keyframe_max_seconds", self.keyframe_max_seconds, {0.5, 5.0}, "s", "time that makes a keyframe");
@@ -199,6 +204,15 @@ struct FrontendConfig {
                  "scans of this time make a keyframe's cloud");
     visit.number("max_scan_delay_s", self.max_scan_delay_s, {0.05, 10.0}, "s", "IMU history kept for late scans");
     visit.number("stationary_speed", self.stationary_speed, {1e-3, 1.0}, "m/s", "slower counts as standing");
+    visit.number("zero_velocity_sigma", self.zero_velocity_sigma, {0.0, 1.0}, "m/s",
+                 "what standing says about the velocity, per scan; 0: standing is not used");
+    visit.number("scan_voxel_m", self.scan_voxel_m, {0.0, 5.0}, "m",
+                 "scans of more than max_scan_points keep one point per such voxel before anything else; 0: all");
+    visit.flag("deskew", self.deskew, "off: points are taken as measured at the scan's end (no point times)");
+    visit.flag("project_degenerate", self.project_degenerate,
+               "off: directions that the scan does not observe are corrected and trusted like all others");
+    visit.flag("quarantine", self.quarantine,
+               "off: points of scans that contradicted the map take part in plane fits at once");
   }
 };
 

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "frontend/deskew.h"
+#include "frontend/scan_selection.h"
+#include "frontend/standstill.h"
 #include "frontend/voxel_downsample.h"
 
 namespace ignis {
@@ -69,6 +71,7 @@ void Lio::reset() {
   contradictions_ = 0;
   trust_ = TrustMonitor(config_);
   last_clipped_.reset();
+  last_standstill_.reset();
 }
 
 LioStatus Lio::status() const {
@@ -162,6 +165,14 @@ ScanResult Lio::refuse(const Scan& scan, ScanReason reason) const {
   return result;
 }
 
+std::vector<CloudPoint> Lio::register_points(const Scan& scan) const {
+  if (config_.deskew) return deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m);
+  std::vector<CloudPoint> cloud;
+  cloud.reserve(scan.points.size());
+  for (const ScanPoint& point : scan.points) cloud.push_back({point.position, point.intensity});
+  return cloud;
+}
+
 ScanResult Lio::process(const Scan& scan) {
   if (!running_) return refuse(scan, ScanReason::kNotInitialised);
   if (scan.end_utime() < filter_.nominal.utime) {
@@ -169,10 +180,11 @@ ScanResult Lio::process(const Scan& scan) {
     return refuse(scan, before_start ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
   }
   advance_to(scan.end_utime());
-  std::vector<CloudPoint> cloud = deskew(scan, filter_.nominal, imu_.samples(), config_);
+  const ScanSelection selection = select_points(scan, config_);
+  std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
   MatchResult match = correct(cloud);
-  match.stats.points = static_cast<int>(cloud.size());
+  match.stats.points = selection.in_range;
   filter_ = match.filter;
   if (last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs) keep_biases(predicted);
   if (match.stats.applied()) {
@@ -181,8 +193,10 @@ ScanResult Lio::process(const Scan& scan) {
     drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans);
   }
   if (match.stats.applied()) ++applied_scans_;
+  use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
-  follow_moving_start(scan, match.stats.reason, cloud);
+  match.stats.imu_disagreement = trust_.disagreement();
+  follow_moving_start(selection.scan, match.stats.reason, cloud);
   grow_map(cloud, match.stats.reason);
 
   ScanResult result;
@@ -221,7 +235,7 @@ void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<C
   if (velocity_known_) return;
   if (reason == ScanReason::kApplied) {
     // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
-    cloud = deskew(scan, filter_.nominal, imu_.samples(), config_);
+    cloud = register_points(scan);
     map_.clear();
     velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
   } else if (is_contradiction(reason)) {
@@ -233,7 +247,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {
   if (reason == ScanReason::kTooFewPoints) return;
   contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
   if (contradictions_ >= config_.reanchor_scans) begin_new_map();
-  const bool confirmed = contradictions_ == 0 || map_.empty();
+  const bool confirmed = contradictions_ == 0 || map_.empty() || !config_.quarantine;
   map_.insert(positions(cloud), filter_.nominal.T_odom_body, confirmed);
   map_.slide(filter_.nominal.T_odom_body.translation);
 }
@@ -273,6 +287,21 @@ void Lio::keep_biases(const FilterState& predicted) {
   filter_.covariance.rightCols<6>().setZero();
   filter_.covariance.bottomRows<6>().setZero();
   filter_.covariance.bottomRightCorner<6, 6>() = predicted.covariance.bottomRightCorner<6, 6>();
+}
+
+/// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
+void Lio::use_standstill(ScanStats& stats) {
+  if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return;
+  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_);
+  if (!standstill) return;
+  stats.standing = true;
+  // Windows that overlap share the noise of their samples.
+  if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillHalfWindowUs) return;
+  last_standstill_ = filter_.nominal.utime;
+  FilterState cautious{filter_.nominal, cautious_};
+  correct_to_standstill(cautious, *standstill);
+  cautious_ = cautious.covariance;
+  correct_to_standstill(filter_, *standstill);
 }
 
 void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {

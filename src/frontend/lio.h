@@ -75,6 +75,8 @@ class Lio {
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
   void begin_new_map();
   void coast_to(Utime utime);
+  void use_standstill(ScanStats& stats);
+  [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan) const;
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
   void start(const FilterState& first);
@@ -100,8 +102,9 @@ class Lio {
   NavState live_;
   bool velocity_known_ = false;
   int applied_scans_ = 0;
-  int contradictions_ = 0;             ///< in a row
-  std::optional<Utime> last_clipped_;  ///< instant of the newest sample that says nothing about the biases
+  int contradictions_ = 0;                ///< in a row
+  std::optional<Utime> last_standstill_;  ///< instant of the last correction to zero velocity
+  std::optional<Utime> last_clipped_;     ///< instant of the newest sample that says nothing about the biases
 };
 
 }  // namespace ignis

@@ -16,7 +16,6 @@ constexpr double kConvergedPosition = 1e-4;  // m
 constexpr double kConvergedAngle = 1e-5;     // rad
 // A normal "touches" a world axis when its component exceeds this; every unit vector touches at least one.
 constexpr double kTouch = 0.5;
-constexpr double kShareOfNewestScan = 0.1;
 constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say little about what is observed
 
 Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, const Eigen::Vector3d& normal) {
@@ -116,13 +115,9 @@ ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
 }
 
 void ScanMatcher::find_observed_directions(const Assessment& assessment, const LocalMap& map) {
-  // One scan is half a turn of an L1's head, and a few lucky normals make a blind direction look observed for a moment,
-  // which is enough to pin the pose to the prediction. Half a second of scans decides.
-  const double share = map.scans() < kYoungMapScans ? 1.0 : kShareOfNewestScan;
-  sensitivity_ += share * (assessment.sensitivity - sensitivity_);
-  normal_noise_ += share * (assessment.normal_noise - normal_noise_);
-  degeneracy_ = analyse_degeneracy(sensitivity_, normal_noise_,
-                                   {mean_range_, config_.degeneracy_threshold, config_.degeneracy_signal_to_noise});
+  degeneracy_ =
+      blind_directions_.add_scan(assessment.sensitivity, assessment.normal_noise, map.scans() >= kYoungMapScans,
+                                 {mean_range_, config_.degeneracy_threshold, config_.degeneracy_signal_to_noise});
 }
 
 void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
@@ -179,8 +174,13 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
       associated_at = iterate.nominal.T_odom_body;
     }
     const PoseInformation all = accumulate(iterate.nominal.T_odom_body, gate_covariance.topLeftCorner<6, 6>());
-    const PoseInformation sum = all.projected(degeneracy_.weighting);
-    result.reliable = all.projected(degeneracy_.projector);
+    const PoseInformation sum = config_.project_degenerate ? all.projected(degeneracy_.weighting) : all;
+    result.reliable = config_.project_degenerate ? all.projected(degeneracy_.projector) : all;
+    if (pass == 0) {
+      const Innovation innovation = normalised_innovation(predicted.covariance.topLeftCorner<6, 6>(), result.reliable);
+      result.stats.nis = innovation.squared;
+      result.stats.nis_directions = innovation.directions;
+    }
     const UpdateStep update =
         information_update(predicted.covariance, difference(predicted.nominal, iterate.nominal), sum);
     if (!update.ok) return false;

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "frontend/blind_directions.h"
 #include "frontend/degeneracy.h"
 #include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
@@ -68,8 +69,7 @@ class ScanMatcher {
   FrontendConfig wide_config_;  ///< gates of planes in the wide neighbourhood
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
-  Matrix6d sensitivity_ = Matrix6d::Zero();   ///< running mean over scans
-  Matrix6d normal_noise_ = Matrix6d::Zero();  ///< the same
+  BlindDirections blind_directions_;
   double mean_range_ = 1.0;
   double mean_map_scan_ = 0.0;  ///< number of the scan that a met map point comes from
 };

@@ -51,9 +51,14 @@ struct ScanStats {
   double velocity_correction = 0.0;  ///< [m/s]
   Eigen::Vector3d observability = Eigen::Vector3d::Zero();  ///< diagonal of sum(n n^T) over its trace, world axes
   int degenerate_directions = 0;                            ///< eigen-directions left to the IMU
-  std::string unobserved;                                   ///< these directions in words, see describe()
-  Pose T_odom_body;                                         ///< after this scan
-  int map_points = 0;                                       ///< in the local map, after this scan
+  /// Normalised innovation squared of the scan, in the directions that it observes; nis_directions on average.
+  double nis = 0.0;
+  int nis_directions = 0;
+  bool standing = false;          ///< the vehicle stood, and the velocity was corrected to zero
+  double imu_disagreement = 0.0;  ///< [sigma] by which scans and IMU disagree about the last two seconds
+  std::string unobserved;         ///< these directions in words, see describe()
+  Pose T_odom_body;               ///< after this scan
+  int map_points = 0;             ///< in the local map, after this scan
 
   [[nodiscard]] bool applied() const { return reason == ScanReason::kApplied; }
 };

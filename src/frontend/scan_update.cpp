@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/scan_update.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "common/so3.h"
@@ -35,6 +36,21 @@ UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d
   update.step = -(update.covariance.leftCols<6>() * constraints.gradient) - restored;
   update.ok = update.ok && update.step.allFinite();
   return update;
+}
+
+Innovation normalised_innovation(const Matrix6d& pose_covariance, const PoseInformation& constraints) {
+  constexpr double kBlind = 1e-9;  // relative to the best direction
+  const Matrix6d& A = constraints.information;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(A * pose_covariance * A + A);
+  const Vector6d along = solver.eigenvectors().transpose() * constraints.gradient;
+  Innovation innovation;
+  for (int i = 0; i < 6; ++i) {
+    const double variance = solver.eigenvalues()[i];
+    if (!(variance > kBlind * solver.eigenvalues()[5])) continue;
+    innovation.squared += along[i] * along[i] / variance;
+    ++innovation.directions;
+  }
+  return innovation;
 }
 
 }  // namespace ignis

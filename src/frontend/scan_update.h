@@ -37,4 +37,15 @@ struct UpdateStep {
 [[nodiscard]] UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
                                             const PoseInformation& constraints);
 
+/// How far a scan lies from the prediction.
+struct Innovation {
+  double squared = 0.0;  ///< normalised by its covariance; `directions` on average when all covariances are true
+  int directions = 0;    ///< degrees of freedom: directions of the pose that the constraints say anything about
+};
+
+/// Normalised innovation squared (NIS) of constraints linearised at the prediction. The gradient H^T R^-1 z has the
+/// covariance A P A + A with A = H^T R^-1 H: no matrix of the size of the scan is needed, and the parts of z that no
+/// pose could explain (residuals within the planes' own noise) do not count.
+[[nodiscard]] Innovation normalised_innovation(const Matrix6d& pose_covariance, const PoseInformation& constraints);
+
 }  // namespace ignis

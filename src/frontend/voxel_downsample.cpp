@@ -22,28 +22,71 @@ std::uint64_t key_of(const Eigen::Vector3i& voxel) {
          ((static_cast<std::uint64_t>(voxel.z()) & kMask) << 42);
 }
 
-}  // namespace
+/// Open addressing, at most half full. Begins small: a dense scan falls into few voxels, and a table that stays in the
+/// cache is worth more than growing it now and then.
+class CellTable {
+ public:
+  explicit CellTable(std::size_t points) : cells_(std::bit_ceil(std::min(2 * points, kFirstSize) + 2)) {}
 
-std::vector<CloudPoint> voxel_downsample(std::span<const CloudPoint> cloud, double voxel_size_m) {
-  std::vector<Cell> table(std::bit_ceil(2 * cloud.size() + 2));
-  const std::size_t mask = table.size() - 1;
+  /// The cell of a voxel, free if the voxel is new. Valid until the next call.
+  Cell& at(std::uint64_t key) {
+    if (2 * used_ >= cells_.size()) grow();
+    Cell& cell = cells_[slot_of(key)];
+    if (cell.index < 0) ++used_;
+    return cell;
+  }
+
+ private:
+  static constexpr std::size_t kFirstSize = 1U << 14U;
+
+  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const {
+    const std::size_t mask = cells_.size() - 1;
+    std::size_t slot = static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> 24) & mask;
+    while (cells_[slot].index >= 0 && cells_[slot].key != key) slot = (slot + 1) & mask;
+    return slot;
+  }
+  void grow() {
+    std::vector<Cell> old(2 * cells_.size());
+    old.swap(cells_);
+    for (const Cell& cell : old) {
+      if (cell.index >= 0) cells_[slot_of(cell.key)] = cell;
+    }
+  }
+
+  std::vector<Cell> cells_;
+  std::size_t used_ = 0;
+};
+
+template <class Point>
+std::vector<Point> nearest_to_centres(std::span<const Point> cloud, double voxel_size_m) {
+  CellTable table(cloud.size());
   const auto edge = static_cast<float>(voxel_size_m);
-  std::vector<CloudPoint> kept;
-  for (const CloudPoint& point : cloud) {
-    const Eigen::Array3f index = (point.position / edge).array().floor();
+  const float per_metre = 1.0F / edge;
+  std::vector<Point> kept;
+  for (const Point& point : cloud) {
+    const Eigen::Array3f index = (point.position * per_metre).array().floor();
     const float distance2 = (point.position - ((index + 0.5F) * edge).matrix()).squaredNorm();
     const std::uint64_t key = key_of(index.cast<int>().matrix());
-    std::size_t slot = static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> 24) & mask;
-    while (table[slot].index >= 0 && table[slot].key != key) slot = (slot + 1) & mask;
-    if (table[slot].index < 0) {
-      table[slot] = {key, static_cast<std::int32_t>(kept.size()), distance2};
+    Cell& cell = table.at(key);
+    if (cell.index < 0) {
+      cell = {key, static_cast<std::int32_t>(kept.size()), distance2};
       kept.push_back(point);
-    } else if (distance2 < table[slot].distance2) {
-      table[slot].distance2 = distance2;
-      kept[static_cast<std::size_t>(table[slot].index)] = point;
+    } else if (distance2 < cell.distance2) {
+      cell.distance2 = distance2;
+      kept[static_cast<std::size_t>(cell.index)] = point;
     }
   }
   return kept;
+}
+
+}  // namespace
+
+std::vector<CloudPoint> voxel_downsample(std::span<const CloudPoint> cloud, double voxel_size_m) {
+  return nearest_to_centres(cloud, voxel_size_m);
+}
+
+std::vector<ScanPoint> voxel_downsample(std::span<const ScanPoint> cloud, double voxel_size_m) {
+  return nearest_to_centres(cloud, voxel_size_m);
 }
 
 std::vector<CloudPoint> thin(std::span<const CloudPoint> cloud, double voxel_size_m, int max_points) {

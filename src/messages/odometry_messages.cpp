@@ -73,6 +73,10 @@ scan_stats_t to_message(const ScanStats& stats) {
   message.velocity_correction = stats.velocity_correction;
   store(stats.observability, message.observability);
   message.degenerate_directions = static_cast<std::int8_t>(stats.degenerate_directions);
+  message.nis = stats.nis;
+  message.nis_directions = static_cast<std::int8_t>(stats.nis_directions);
+  message.standing = stats.standing ? 1 : 0;
+  message.imu_disagreement = stats.imu_disagreement;
   store(stats.T_odom_body.translation, message.position);
   store(stats.T_odom_body.rotation, message.quaternion);
   message.map_points = stats.map_points;
@@ -95,6 +99,10 @@ ScanStats from_message(const scan_stats_t& message) {
   stats.velocity_correction = message.velocity_correction;
   stats.observability = load(message.observability);
   stats.degenerate_directions = message.degenerate_directions;
+  stats.nis = message.nis;
+  stats.nis_directions = message.nis_directions;
+  stats.standing = message.standing != 0;
+  stats.imu_disagreement = message.imu_disagreement;
   stats.T_odom_body = {load(message.quaternion), load(message.position)};
   stats.map_points = message.map_points;
   return stats;

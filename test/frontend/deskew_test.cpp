@@ -23,6 +23,7 @@ test::Sensors ideal_sensors() {
   return sensors;
 }
 
+constexpr double kGravity = 9.81;
 const test::World kCube{{{-3.0, -3.0, -3.0}, {3.0, 3.0, 3.0}}, {}, {}};
 
 /// [m] largest distance of a point, placed in the world, from the nearest wall of the cube.
@@ -55,7 +56,7 @@ TEST(Deskew, PureRotationMakesWallsThin) {
   };
   const test::Drive drive = test::simulate(kCube, truth, 0.3, ideal_sensors(), 1);
   const Scan& scan = drive.scans[2];
-  const auto cloud = deskew(scan, state_at(truth, 0.15, scan.end_utime()), drive.imu, FrontendConfig{});
+  const auto cloud = deskew(scan, state_at(truth, 0.15, scan.end_utime()), drive.imu, kGravity);
   EXPECT_GT(wall_thickness(raw_cloud(scan), truth(0.15)), 0.1);
   EXPECT_LT(wall_thickness(cloud, truth(0.15)), 1e-3);
 }
@@ -67,9 +68,9 @@ TEST(Deskew, TranslationWithAccelerationMakesWallsThin) {
   const test::Drive drive = test::simulate(kCube, truth, 0.3, ideal_sensors(), 1);
   const Scan& scan = drive.scans[2];
   NavState end = state_at(truth, 0.15, scan.end_utime());
-  EXPECT_LT(wall_thickness(deskew(scan, end, drive.imu, FrontendConfig{}), truth(0.15)), 1e-3);
+  EXPECT_LT(wall_thickness(deskew(scan, end, drive.imu, kGravity), truth(0.15)), 1e-3);
   end.v_odom.setZero();
-  EXPECT_GT(wall_thickness(deskew(scan, end, drive.imu, FrontendConfig{}), truth(0.15)), 0.02)
+  EXPECT_GT(wall_thickness(deskew(scan, end, drive.imu, kGravity), truth(0.15)), 0.02)
       << "without a velocity the result is defined, but only as good as the rotation";
 }
 
@@ -81,26 +82,22 @@ TEST(Deskew, LeavesPointsOfTheEndInPlace) {
   end.v_odom = {5.0, 0.0, 0.0};
   std::vector<ImuSample> samples(2);
   samples[1].utime = 60'000;
-  const auto cloud = deskew(scan, end, samples, FrontendConfig{});
+  const auto cloud = deskew(scan, end, samples, kGravity);
   ASSERT_EQ(cloud.size(), 1U);
   EXPECT_LT((cloud[0].position - scan.points[0].position).norm(), 1e-6F);
   EXPECT_EQ(cloud[0].intensity, 7.0F);
 }
 
-TEST(Deskew, DropsPointsOutOfRangeOrNotFiniteAndClampsInstants) {
+TEST(Deskew, ClampsInstantsOutsideTheScan) {
   Scan scan;
   scan.duration_us = 50'000;
-  scan.points = {{{0.1F, 0.0F, 0.0F}, 0.0F, 0},
-                 {{16.0F, 0.0F, 0.0F}, 0.0F, 0},
-                 {{std::nanf(""), 0.0F, 1.0F}, 0.0F, 0},
-                 {{2.0F, 0.0F, 0.0F}, 0.0F, -1'000'000},
-                 {{3.0F, 0.0F, 0.0F}, 0.0F, 1'000'000'000}};
+  scan.points = {{{2.0F, 0.0F, 0.0F}, 0.0F, -1'000'000}, {{3.0F, 0.0F, 0.0F}, 0.0F, 1'000'000'000}};
   std::vector<ImuSample> samples(2);
   samples[1].utime = 50'000;
   NavState end;
   end.v_odom = {1.0, 0.0, 0.0};
-  for (ImuSample& sample : samples) sample.accel = {0.0, 9.81, 0.0};
-  const auto cloud = deskew(scan, end, samples, FrontendConfig{});
+  for (ImuSample& sample : samples) sample.accel = {0.0, kGravity, 0.0};
+  const auto cloud = deskew(scan, end, samples, kGravity);
   ASSERT_EQ(cloud.size(), 2U);
   EXPECT_NEAR(cloud[0].position.x(), 2.0F - 0.05F, 1e-5F);
   EXPECT_NEAR(cloud[1].position.x(), 3.0F, 1e-5F);

@@ -104,6 +104,41 @@ TEST(ScanUpdate, ReportsValuesThatAreNotFinite) {
   EXPECT_FALSE(information_update(Matrix15d::Identity(), Vector15d::Zero(), sum).ok);
 }
 
+TEST(NormalisedInnovation, OfOneConstraintIsTheScalarOne) {
+  std::mt19937 random(5);
+  const Matrix6d P = random_covariance(random).topLeftCorner<6, 6>();
+  const ScalarConstraint constraint = random_constraints(random, 1).front();
+  PoseInformation sum;
+  sum.add(constraint.h, 0.07, constraint.variance);
+  const Innovation innovation = normalised_innovation(P, sum);
+  EXPECT_EQ(innovation.directions, 1);
+  EXPECT_NEAR(innovation.squared, 0.07 * 0.07 / (constraint.h.dot(P * constraint.h) + constraint.variance), 1e-9);
+}
+
+TEST(NormalisedInnovation, HasTheMeanOfItsDegreesOfFreedomWhenCovariancesAreTrue) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  const Matrix6d P = random_covariance(random).topLeftCorner<6, 6>();
+  const Matrix6d root = P.llt().matrixL();
+  const std::vector<ScalarConstraint> constraints = random_constraints(random, 60);
+  constexpr int kTrials = 4000;
+  double sum = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Vector6d white;
+    for (double& value : white) value = normal(random);
+    const Vector6d error = root * white;
+    PoseInformation measured;
+    for (const ScalarConstraint& c : constraints) {
+      measured.add(c.h, c.h.dot(error) + std::sqrt(c.variance) * normal(random), c.variance);
+    }
+    const Innovation innovation = normalised_innovation(P, measured);
+    ASSERT_EQ(innovation.directions, 6);
+    sum += innovation.squared / kTrials;
+  }
+  EXPECT_NEAR(sum, 6.0, 4.0 * std::sqrt(12.0 / kTrials))
+      << "chi-square of 6 degrees of freedom, four sigma of its mean";
+}
+
 TEST(Degeneracy, FindsTheDirectionThatNoPlaneSees) {
   // Planes facing X and Y only, at various lever arms: position along Z is free.
   std::mt19937 random(4);

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`./ignis evaluate`: accuracy, honesty and cost of the pipeline over scenes and seeds, one row a drive.
+
+With `--variant NAME:section.key=value,...` (repeated) every drive is replayed once more for each variant: an ablation.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ignis.errors import InputError, run_command, run_quietly
+from ignis.evaluation.consistency import BAND, band, nees_of
+from ignis.evaluation.drives import Simulation, simulate
+from ignis.files import write_text
+from ignis.poses import read_tum
+from ignis.trajectory_error import errors_of, paired
+
+_CHECKOUT = Path(os.environ.get("IGNIS_CHECKOUT", "."))
+_SCENES = ("battery_hall", "trees_side_room", "identical_rooms", "corridor", "open_hall_ramp")
+_COLUMNS = (
+    ("ate_m", "ATE m", "{:.3f}"),
+    ("smoothed_ate_m", "smoothed", "{:.3f}"),
+    ("rpe_10m_m", "RPE/10 m", "{:.3f}"),
+    ("drift_percent", "drift %", "{:.2f}"),
+    ("nees_position", "NEES pos.", "{:.2f}"),
+    ("nees_attitude", "NEES att.", "{:.2f}"),
+    ("applied_percent", "applied %", "{:.1f}"),
+    ("named_percent", "named %", "{:.1f}"),
+    ("loops", "loops", "{:d}"),
+    ("scan_p50_ms", "ms p50", "{:.2f}"),
+    ("scan_p99_ms", "ms p99", "{:.2f}"),
+)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A change of the configuration under a name."""
+
+    name: str
+    changes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Row:
+    """One replay of one drive."""
+
+    simulation: Simulation
+    variant: Variant
+    figures: dict[str, Any]
+
+
+def _replay(simulation: Simulation, variant: Variant, config: Path, folder: Path, binaries: Path) -> Row:
+    out = folder / f"{simulation.name}_{variant.name}"
+    command = [binaries / "lio_replay", simulation.log, "--config", config, "--out", out]
+    for change in variant.changes:
+        command += ["--set", change]
+    run_quietly(command)
+    report = json.loads((out / "report.json").read_text())
+    truth = read_tum(simulation.truth)
+    eskf = errors_of(paired(read_tum(out / "eskf.tum"), truth), per_scan=False)
+    smoothed = errors_of(paired(read_tum(out / "smoothed.tum"), truth), per_scan=False)
+    position, attitude = nees_of(out, truth)
+    figures = {
+        "ate_m": eskf["ate_rmse_m"],
+        "smoothed_ate_m": smoothed["ate_rmse_m"],
+        "rpe_10m_m": eskf["rpe_10m_rmse_m"],
+        "drift_percent": eskf["end_error_percent"],
+        "nees_position": position,
+        "nees_attitude": attitude,
+        "applied_percent": 100.0 * report["scans_applied"] / report["scans"],
+        "named_percent": 100.0 * report["scans_with_unobserved_directions"] / report["scans"],
+        "loops": report["loops_kept"],
+        "scan_p50_ms": report["timing"]["scan_p50_ms"],
+        "scan_p99_ms": report["timing"]["scan_p99_ms"],
+    }
+    return Row(simulation, variant, figures)
+
+
+def _cells(figures: dict[str, Any]) -> str:
+    return " | ".join("" if figures[key] is None else form.format(figures[key]) for key, _, form in _COLUMNS)
+
+
+def table(rows: list[Row]) -> str:
+    """Markdown: every drive, then per variant and scene the mean over the seeds of the normalised errors."""
+    lines = ["| scene, seed | variant | " + " | ".join(title for _, title, _ in _COLUMNS) + " |"]
+    lines += ["|---" * (len(_COLUMNS) + 2) + "|"]
+    ordered = sorted(rows, key=lambda row: (row.simulation.scene, row.simulation.seed))
+    lines += [
+        f"| {row.simulation.scene}, {row.simulation.seed} | {row.variant.name} | {_cells(row.figures)} |"
+        for row in ordered
+    ]
+    lines += ["", f"Mean NEES per degree of freedom over the seeds, and its {100 * BAND:.0f} % band:", ""]
+    lines += ["| scene | variant | position | attitude | band |", "|---|---|---|---|---|"]
+    groups = dict.fromkeys((row.simulation.scene, row.variant.name) for row in ordered)
+    for scene, variant in groups:
+        group = [row.figures for row in ordered if (row.simulation.scene, row.variant.name) == (scene, variant)]
+        low, high = band(3 * len(group))
+        mean = {key: sum(f[key] for f in group) / len(group) for key in ("nees_position", "nees_attitude")}
+        lines.append(
+            f"| {scene} | {variant} | {mean['nees_position']:.2f} | {mean['nees_attitude']:.2f} "
+            f"| {low:.2f} to {high:.2f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def evaluate(arguments: argparse.Namespace) -> int:
+    """Simulates and replays everything; the table is written anew after each drive."""
+    binaries = Path(os.environ["IGNIS_BUILD"]) / "bin"
+    variants = arguments.variant or [Variant("as configured")]
+    drives = [(scene, seed) for seed in arguments.seeds for scene in arguments.scenes]
+    rows: list[Row] = []
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+
+        def run(drive: tuple[str, int]) -> list[Row]:
+            scene = _CHECKOUT / "config" / "scenes" / f"{drive[0]}.json"
+            simulation = simulate(
+                binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, arguments.out / "inputs"
+            )
+            return [_replay(simulation, v, arguments.config, arguments.out / "runs", binaries) for v in variants]
+
+        for done in concurrent.futures.as_completed([pool.submit(run, drive) for drive in drives]):
+            for row in done.result():
+                rows.append(row)
+                print(
+                    f"evaluate: {len(rows)} of {len(drives) * len(variants)}: {row.simulation.name} "
+                    f"{row.variant.name}: ATE {row.figures['ate_m']:.3f} m",
+                    flush=True,
+                )
+            write_text(arguments.out / "evaluation.md", table(rows))
+    write_text(
+        arguments.out / "evaluation.json",
+        json.dumps(
+            [
+                {"scene": r.simulation.scene, "seed": r.simulation.seed, "variant": r.variant.name} | r.figures
+                for r in rows
+            ],
+            indent=2,
+        )
+        + "\n",
+    )
+    print(f"\n{table(rows)}\n{arguments.out / 'evaluation.md'}")
+    return 0
+
+
+def _variant(text: str) -> Variant:
+    name, colon, changes = text.partition(":")
+    if not name or not colon:
+        raise argparse.ArgumentTypeError("write NAME:section.key=value, with commas between several")
+    return Variant(name, tuple(change for change in changes.split(",") if change))
+
+
+def _seeds(text: str) -> list[int]:
+    first, dash, last = text.partition("-")
+    try:
+        return list(range(int(first), int(last) + 1)) if dash else [int(word) for word in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError("write 1-5 or 1,3,7") from None
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="ignis evaluate", description=__doc__.splitlines()[0])
+    parser.add_argument("--scenes", type=lambda text: text.split(","), default=list(_SCENES), help="in config/scenes")
+    parser.add_argument("--seeds", type=_seeds, default=[1, 2, 3], help="1-5 or 1,3,7 (default 1-3)")
+    parser.add_argument("--config", type=Path, default=_CHECKOUT / "config" / "ignis8_tuned.json")
+    parser.add_argument("--variant", type=_variant, action="append", help="NAME:section.key=value,...; repeatable")
+    parser.add_argument(
+        "--scene-set", action="append", default=[], help="section.key=value in every scene; repeatable", metavar="K=V"
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="drives at the same time (times per scan suffer)")
+    parser.add_argument("--out", type=Path, default=Path("results/evaluation"))
+    parsed = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    if parsed.jobs < 1:
+        parser.error("--jobs: at least 1")
+    missing = [name for name in parsed.scenes if not (_CHECKOUT / "config" / "scenes" / f"{name}.json").is_file()]
+    if missing:
+        return run_command(lambda: (_ for _ in ()).throw(InputError(f"no such scene: {', '.join(missing)}")))
+    return run_command(lambda: evaluate(parsed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Normalised estimation error squared (NEES): are the errors of a drive what its covariances announce?
+
+Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4.
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+from ignis.poses import Poses, Trajectory, quaternion_from_matrix, read_tum, rotation_matrix
+from ignis.trajectory_error import paired
+
+BAND = 0.95
+
+
+def band(degrees: int) -> tuple[float, float]:
+    """Where the mean per degree of freedom lies with probability BAND. Scans of one drive share their errors, so a
+    drive counts as one draw."""
+    tail = 0.5 * (1.0 - BAND)
+    return float(chi2.ppf(tail, degrees) / degrees), float(chi2.ppf(1.0 - tail, degrees) / degrees)
+
+
+def read_pose_covariances(file: Path) -> np.ndarray:
+    """n x 6 x 6 from eskf_states.csv: attitude in body axes, then position in odom axes."""
+    with file.open(newline="") as stream:
+        rows = csv.reader(stream)
+        first = next(rows).index("p00")
+        upper = np.array([[float(value) for value in row[first : first + 21]] for row in rows])
+    covariance = np.zeros((len(upper), 6, 6))
+    row, column = np.triu_indices(6)
+    covariance[:, row, column] = upper
+    covariance[:, column, row] = upper
+    return covariance
+
+
+def nees_of(folder: Path, truth: Trajectory) -> tuple[float, float]:
+    """Of position and attitude, per degree of freedom, mean over the scans of a replay's folder. The frame of reference
+    is level and has its origin and heading at the first pose, so the tilt of the start is an error."""
+    estimate = read_tum(folder / "eskf.tum")
+    covariance = read_pose_covariances(folder / "eskf_states.csv")
+    pair = paired(estimate, truth)
+    covariance = covariance[np.isin(estimate.utime, pair.estimate.utime)]
+    true = _level_start(pair.truth.poses[:1]).inverse()[np.zeros(len(covariance), dtype=int)] @ pair.truth.poses
+    shift = true.position - pair.estimate.poses.position
+    R_estimate = rotation_matrix(pair.estimate.poses.quaternion)
+    R_error = np.einsum("nji,njk->nik", R_estimate, rotation_matrix(true.quaternion))
+    # The errors are fractions of a degree or the pose is lost anyhow: the skew part is the rotation vector.
+    turn = 0.5 * np.stack(
+        [R_error[:, 2, 1] - R_error[:, 1, 2], R_error[:, 0, 2] - R_error[:, 2, 0], R_error[:, 1, 0] - R_error[:, 0, 1]],
+        axis=1,
+    )
+    return _mean_square(shift, covariance[:, 3:, 3:]), _mean_square(turn, covariance[:, :3, :3])
+
+
+def _level_start(first: Poses) -> Poses:
+    forward = rotation_matrix(first.quaternion)[0] @ np.array([0.0, 0.0, -1.0])
+    yaw = np.arctan2(-forward[0], -forward[2])
+    level = np.array([[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]])
+    return Poses(first.position, quaternion_from_matrix(level)[None])
+
+
+def _mean_square(errors: np.ndarray, covariances: np.ndarray) -> float:
+    weighted = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
+    return float(np.mean(np.einsum("ni,ni->n", errors, weighted)) / errors.shape[1])

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "frontend/degeneracy.h"
+
+namespace ignis {
+
+/// Degeneracy over the scans of a drive.
+///
+/// One scan is half a turn of an L1's head, and a few lucky normals make a blind direction look observed for a moment,
+/// which is enough to pin the pose to the prediction: half a second of scans decides. Even then the blind direction is
+/// known to a few degrees only, and a different one in each scan: what one scan leaves open, the next pins through the
+/// tilt between the two, the harder the better the other directions are observed. So a blind direction is averaged over
+/// two seconds and then stays what it is until it ends, and it takes more evidence to end it than to name it.
+class BlindDirections {
+ public:
+  /// Takes what the next scan says (see analyse_degeneracy). `settled` is false while the map is so young that older
+  /// scans say nothing about it.
+  [[nodiscard]] DegeneracyAnalysis add_scan(const Matrix6d& sensitivity, const Matrix6d& noise, bool settled,
+                                            const DegeneracyLimits& limits);
+
+ private:
+  void hold(const Matrix6d& sensitivity, const DegeneracyLimits& limits, DegeneracyAnalysis& analysis);
+  void restart(double length_m);
+
+  Matrix6d sensitivity_ = Matrix6d::Zero();       ///< running mean over half a second of scans
+  Matrix6d noise_ = Matrix6d::Zero();             ///< the same
+  Matrix6d held_sensitivity_ = Matrix6d::Zero();  ///< mean over the first scans of a blindness
+  Matrix6d held_basis_ = Matrix6d::Identity();    ///< eigenvectors of that, in scaled coordinates
+  std::array<bool, 6> blind_{};                   ///< which of them
+  double held_length_ = 1.0;                      ///< [m] that scales attitude there: another one would tilt them
+  int held_scans_ = 0;                            ///< in the mean; 0: nothing is blind
+  int disagreeing_ = 0;                           ///< scans in a row that found more blind directions than are held
+};
+
+}  // namespace ignis

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/standstill.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "common/so3.h"
+
+namespace ignis {
+namespace {
+
+constexpr double kMaxVelocitySigma = 0.1;  // m/s: above it the filter cannot tell standing from rolling
+constexpr double kSigmas = 3.0;
+constexpr std::ptrdiff_t kMinSamples = 4;  // in each half of the window
+
+struct Quiet {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s] mean
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< [m/s^2] mean
+  double gyro_sigma = 0.0;                          ///< root of the largest axis variance
+  double accel_sigma = 0.0;
+  Eigen::Vector3d accel_drift = Eigen::Vector3d::Zero();  ///< mean of the second half minus that of the first
+};
+
+Quiet summarise(std::span<const ImuSample> window) {
+  const auto count = static_cast<double>(window.size());
+  const std::size_t half = window.size() / 2;
+  Quiet quiet;
+  Eigen::Vector3d first_half = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    quiet.gyro += window[i].gyro / count;
+    quiet.accel += window[i].accel / count;
+    if (i < half) first_half += window[i].accel / static_cast<double>(half);
+  }
+  quiet.accel_drift =
+      (quiet.accel * count - first_half * static_cast<double>(half)) / static_cast<double>(window.size() - half) -
+      first_half;
+  Eigen::Vector3d gyro_variance = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_variance = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : window) {
+    gyro_variance += (sample.gyro - quiet.gyro).cwiseAbs2() / count;
+    accel_variance += (sample.accel - quiet.accel).cwiseAbs2() / count;
+  }
+  quiet.gyro_sigma = std::sqrt(gyro_variance.maxCoeff());
+  quiet.accel_sigma = std::sqrt(accel_variance.maxCoeff());
+  return quiet;
+}
+
+double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
+  return std::sqrt(covariance.diagonal().segment<3>(block).maxCoeff());
+}
+
+/// Velocity at the middle of the window by integration back from now, attitude and biases held.
+Standstill at_middle(std::span<const ImuSample> late_half, const FilterState& filter, const FrontendConfig& config) {
+  const NavState& state = filter.nominal;
+  const double seconds = 1e-6 * static_cast<double>(kStandstillHalfWindowUs);
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : late_half) force += sample.accel / static_cast<double>(late_half.size());
+  force -= state.accel_bias;
+  const Eigen::Matrix3d R = state.T_odom_body.rotation.toRotationMatrix();
+  Standstill standstill;
+  standstill.velocity = state.v_odom - seconds * (R * force - Eigen::Vector3d(0.0, config.gravity_m, 0.0));
+  standstill.derivative.middleCols<3>(kAttitude) = seconds * R * so3::skew(force);
+  standstill.derivative.middleCols<3>(kVelocity).setIdentity();
+  standstill.derivative.middleCols<3>(kAccelBias) = seconds * R;
+  standstill.variance = config.zero_velocity_sigma * config.zero_velocity_sigma +
+                        config.imu_noise_accel * config.imu_noise_accel * seconds;
+  return standstill;
+}
+
+}  // namespace
+
+std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
+                                          const FrontendConfig& config) {
+  const NavState& state = filter.nominal;
+  const double velocity_sigma = largest_sigma(filter.covariance, kVelocity);
+  const double speed_limit = std::min(config.stationary_speed + 2.0 * velocity_sigma, 3.0 * config.stationary_speed);
+  if (velocity_sigma > kMaxVelocitySigma || state.v_odom.norm() > speed_limit) return std::nullopt;
+
+  const auto begin =
+      std::ranges::lower_bound(samples, state.utime - 2 * kStandstillHalfWindowUs, {}, &ImuSample::utime);
+  const auto middle = std::ranges::lower_bound(samples, state.utime - kStandstillHalfWindowUs, {}, &ImuSample::utime);
+  const auto end = std::ranges::upper_bound(samples, state.utime, {}, &ImuSample::utime);
+  if (begin == samples.begin() || middle - begin < kMinSamples || end - middle < kMinSamples) return std::nullopt;
+  const std::span<const ImuSample> window(begin, end);
+  if (std::ranges::any_of(window, &ImuSample::saturated)) return std::nullopt;
+
+  const Quiet quiet = summarise(window);
+  const double seconds = 2e-6 * static_cast<double>(kStandstillHalfWindowUs);
+  const double gyro_limit =
+      kSigmas * (config.imu_noise_gyro / std::sqrt(seconds) + largest_sigma(filter.covariance, kGyroBias));
+  // The noise of a mean over half the window, twice: the difference of two such means.
+  const double drift_limit = kSigmas * config.imu_noise_accel * std::sqrt(4.0 / seconds);
+  const bool still = quiet.gyro_sigma <= config.rest_gyro_sigma && quiet.accel_sigma <= config.rest_accel_sigma &&
+                     (quiet.gyro - state.gyro_bias).norm() <= gyro_limit && quiet.accel_drift.norm() <= drift_limit &&
+                     std::abs((quiet.accel - state.accel_bias).norm() - config.gravity_m) <= config.rest_accel_band;
+  if (!still) return std::nullopt;
+  return at_middle({middle, end}, filter, config);
+}
+
+void correct_to_standstill(FilterState& filter, const Standstill& standstill) {
+  const Matrix15d& P = filter.covariance;
+  const Eigen::Matrix<double, 3, 15>& H = standstill.derivative;
+  const Eigen::Matrix3d R = standstill.variance * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix<double, 15, 3> K = P * H.transpose() * (H * P * H.transpose() + R).inverse();
+  const Matrix15d kept = Matrix15d::Identity() - K * H;
+  const Vector15d step = -K * standstill.velocity;
+  filter.covariance = kept * P * kept.transpose() + K * R * K.transpose();
+  filter.covariance = (0.5 * (filter.covariance + filter.covariance.transpose())).eval();
+  filter.nominal = perturbed(filter.nominal, step);
+}
+
+}  // namespace ignis
