@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/blind_directions.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <Eigen/Eigenvalues>
 
 namespace ignis {
@@ -22,9 +19,19 @@ DegeneracyAnalysis BlindDirections::add_scan(const Matrix6d& sensitivity, const 
   const double share = settled ? kShareOfNewestScan : 1.0;
   sensitivity_ += share * (sensitivity - sensitivity_);
   noise_ += share * (noise - noise_);
-  DegeneracyAnalysis analysis = analyse_degeneracy(sensitivity_, noise_, limits);
-  if (settled && (analysis.degenerate_directions > 0 || held_scans_ > 0)) hold(sensitivity, limits, analysis);
-  return analysis;
+  const DegeneracyAnalysis newest = analyse_degeneracy(sensitivity_, noise_, limits);
+  if (!settled || (newest.degenerate_directions == 0 && held_scans_ == 0)) return newest;
+
+  if (held_scans_ == 0 || disagreeing_ > kMostDisagreeing) restart(limits.length_m);
+  const ScaledSensitivity recent(sensitivity_, noise_, held_length_);
+  if (held_scans_ < kMostHeldScans) average_direction(sensitivity);
+  std::array<double, 6> needed;
+  for (std::size_t i = 0; i < 6; ++i) needed[i] = limits.min_signal_to_noise * (blind_[i] ? kRelease : 1.0);
+  const DegeneracyAnalysis held = judge_directions(held_basis_, recent, needed, limits.min_sensitivity);
+  blind_ = held.blind;
+  disagreeing_ = newest.degenerate_directions > held.degenerate_directions ? disagreeing_ + 1 : 0;
+  if (newest.degenerate_directions == 0 && held.degenerate_directions == 0) held_scans_ = 0;
+  return held;
 }
 
 void BlindDirections::restart(double length_m) {
@@ -35,40 +42,11 @@ void BlindDirections::restart(double length_m) {
   disagreeing_ = 0;
 }
 
-void BlindDirections::hold(const Matrix6d& sensitivity, const DegeneracyLimits& limits, DegeneracyAnalysis& analysis) {
-  if (held_scans_ == 0 || disagreeing_ > kMostDisagreeing) restart(limits.length_m);
-  Vector6d scale = Vector6d::Ones();
-  scale.head<3>().setConstant(held_length_);
-  const Vector6d inverse_scale = scale.cwiseInverse();
-  const auto scaled = [&](const Matrix6d& matrix) -> Matrix6d {
-    return inverse_scale.asDiagonal() * matrix * inverse_scale.asDiagonal();
-  };
-  if (held_scans_ < kMostHeldScans) {
-    ++held_scans_;
-    held_sensitivity_ += (sensitivity - held_sensitivity_) / held_scans_;
-    held_basis_ = Eigen::SelfAdjointEigenSolver<Matrix6d>(scaled(held_sensitivity_)).eigenvectors();
-  }
-  const Matrix6d recent = scaled(sensitivity_);
-  const Matrix6d recent_noise = scaled(noise_);
-  const int found = analysis.degenerate_directions;
-  analysis.degenerate.clear();
-  Matrix6d observed = Matrix6d::Zero();
-  for (std::size_t i = 0; i < 6; ++i) {
-    const Vector6d direction = held_basis_.col(static_cast<Eigen::Index>(i));
-    const double value = direction.dot(recent * direction);
-    const double noise = direction.dot(recent_noise * direction);
-    const double needed = limits.min_signal_to_noise * (blind_[i] ? kRelease : 1.0);
-    blind_[i] = value < limits.min_sensitivity || value < needed * noise;
-    if (blind_[i]) {
-      analysis.degenerate.push_back(direction);
-    } else {
-      observed += std::sqrt(std::max(1.0 - noise / value, 0.0)) * direction * direction.transpose();
-    }
-  }
-  analysis.degenerate_directions = static_cast<int>(analysis.degenerate.size());
-  analysis.projector = inverse_scale.asDiagonal() * observed * scale.asDiagonal();
-  disagreeing_ = found > analysis.degenerate_directions ? disagreeing_ + 1 : 0;
-  if (analysis.degenerate_directions == 0 && found == 0) held_scans_ = 0;
+void BlindDirections::average_direction(const Matrix6d& sensitivity) {
+  ++held_scans_;
+  held_sensitivity_ += (sensitivity - held_sensitivity_) / held_scans_;
+  const ScaledSensitivity mean(held_sensitivity_, noise_, held_length_);
+  held_basis_ = Eigen::SelfAdjointEigenSolver<Matrix6d>(mean.value).eigenvectors();
 }
 
 }  // namespace ignis

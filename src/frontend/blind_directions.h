@@ -22,8 +22,8 @@ class BlindDirections {
                                             const DegeneracyLimits& limits);
 
  private:
-  void hold(const Matrix6d& sensitivity, const DegeneracyLimits& limits, DegeneracyAnalysis& analysis);
   void restart(double length_m);
+  void average_direction(const Matrix6d& sensitivity);
 
   Matrix6d sensitivity_ = Matrix6d::Zero();       ///< running mean over half a second of scans
   Matrix6d noise_ = Matrix6d::Zero();             ///< the same

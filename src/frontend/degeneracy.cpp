@@ -9,37 +9,92 @@
 
 namespace ignis {
 
-DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6d& noise,
-                                      const DegeneracyLimits& limits) {
-  Vector6d scale = Vector6d::Ones();
-  scale.head<3>().setConstant(limits.length_m);
-  const Vector6d inverse_scale = scale.cwiseInverse();
-  const Matrix6d scaled = inverse_scale.asDiagonal() * sensitivity * inverse_scale.asDiagonal();
-  const Matrix6d scaled_noise = inverse_scale.asDiagonal() * noise * inverse_scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(scaled);
+namespace {
 
+constexpr double kMostlyShift = 0.7;  // of a unit vector: beyond, it is more shift than turn
+
+Vector6d without_small_turn(const Vector6d& direction) {
+  Vector6d pure = direction;
+  if (direction.tail<3>().norm() > kMostlyShift) pure.head<3>().setZero();
+  return pure;
+}
+
+/// Adds a direction to an orthonormal list.
+void append_orthonormal(std::vector<Vector6d>& list, Vector6d direction) {
+  for (const Vector6d& other : list) direction -= other * other.dot(direction);
+  if (direction.norm() > 1e-6) list.push_back(direction.normalized());
+}
+
+}  // namespace
+
+ScaledSensitivity::ScaledSensitivity(const Matrix6d& sensitivity, const Matrix6d& normal_noise, double length)
+    : length_m(length) {
+  Vector6d inverse_scale = Vector6d::Ones();
+  inverse_scale.head<3>().setConstant(1.0 / length);
+  value = inverse_scale.asDiagonal() * sensitivity * inverse_scale.asDiagonal();
+  noise = inverse_scale.asDiagonal() * normal_noise * inverse_scale.asDiagonal();
+}
+
+DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivity& scan,
+                                    const std::array<double, 6>& needed, double min_sensitivity) {
   DegeneracyAnalysis analysis;
-  analysis.eigenvalues = solver.eigenvalues();
-  Matrix6d weighted = Matrix6d::Zero();
   Matrix6d observed = Matrix6d::Zero();
-  for (int i = 0; i < 6; ++i) {
-    const Vector6d direction = solver.eigenvectors().col(i);
-    const double value = analysis.eigenvalues[i];
-    analysis.noise[i] = direction.dot(scaled_noise * direction);
-    const bool blind = value < limits.min_sensitivity;
-    const double kept = blind ? 0.0 : std::sqrt(std::max(1.0 - analysis.noise[i] / value, 0.0));
-    const Matrix6d part = kept * direction * direction.transpose();
-    weighted += part;
-    if (blind || value < limits.min_signal_to_noise * analysis.noise[i]) {
-      analysis.degenerate.push_back(direction);
-      ++analysis.degenerate_directions;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const Vector6d direction = basis.col(k);
+    const double value = direction.dot(scan.value * direction);
+    const double noise = direction.dot(scan.noise * direction);
+    analysis.eigenvalues[k] = value;
+    analysis.noise[k] = noise;
+    analysis.blind[i] = value < min_sensitivity || value < needed[i] * noise;
+    if (analysis.blind[i]) {
+      append_orthonormal(analysis.degenerate, without_small_turn(direction));
     } else {
-      observed += part;
+      observed += std::sqrt(std::max(1.0 - noise / value, 0.0)) * direction * direction.transpose();
     }
   }
-  analysis.weighting = inverse_scale.asDiagonal() * weighted * scale.asDiagonal();
+  analysis.degenerate_directions = static_cast<int>(analysis.degenerate.size());
+
+  Matrix6d rest = Matrix6d::Identity();
+  Matrix6d doubtful = Matrix6d::Zero();
+  for (const Vector6d& direction : analysis.degenerate) {
+    const double value = direction.dot(scan.value * direction);
+    const double noise = direction.dot(scan.noise * direction);
+    const bool unseen = value < min_sensitivity || value <= 0.0;
+    const double kept = unseen ? 0.0 : std::sqrt(std::max(1.0 - noise / value, 0.0));
+    doubtful += kept * direction * direction.transpose();
+    rest -= direction * direction.transpose();
+  }
+  observed = (rest * observed * rest).eval();
+
+  Vector6d scale = Vector6d::Ones();
+  scale.head<3>().setConstant(scan.length_m);
+  const Vector6d inverse_scale = scale.cwiseInverse();
+  analysis.weighting = inverse_scale.asDiagonal() * (observed + doubtful) * scale.asDiagonal();
   analysis.projector = inverse_scale.asDiagonal() * observed * scale.asDiagonal();
   return analysis;
+}
+
+DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6d& noise,
+                                      const DegeneracyLimits& limits) {
+  const ScaledSensitivity scan(sensitivity, noise, limits.length_m);
+  std::array<double, 6> needed;
+  needed.fill(limits.min_signal_to_noise);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(scan.value);
+  return judge_directions(solver.eigenvectors(), scan, needed, limits.min_sensitivity);
+}
+
+Eigen::Matrix3d tilt_of_blind_shifts(const DegeneracyAnalysis& analysis, const Eigen::Matrix3d& position_covariance) {
+  constexpr double kTilt = 0.015;  // rad, one sigma of two seconds of scans in a bare corridor
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Vector6d& direction : analysis.degenerate) {
+    const Eigen::Vector3d shift = direction.tail<3>();
+    if (shift.norm() < kMostlyShift) continue;
+    const Eigen::Vector3d axis = shift.normalized();
+    const double along = axis.dot(position_covariance * axis);
+    sum += kTilt * kTilt * along * (Eigen::Matrix3d::Identity() - axis * axis.transpose());
+  }
+  return sum;
 }
 
 std::string describe(const DegeneracyAnalysis& analysis) {

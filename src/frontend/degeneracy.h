@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,21 @@ struct DegeneracyLimits {
   double min_signal_to_noise = 0;  ///< the same, relative to what the errors of the normals alone make of it
 };
 
+/// What a scan says of each direction, in coordinates in which all six are of one kind: (length x attitude, position).
+struct ScaledSensitivity {
+  ScaledSensitivity(const Matrix6d& sensitivity, const Matrix6d& noise, double length_m);
+
+  double length_m;
+  Matrix6d value;  ///< mean of h h^T over the matched points, scaled
+  Matrix6d noise;  ///< the part of it that errors of the normals explain
+};
+
 /// Which directions of a 6-dimensional pose error (attitude in body axes, position in odom axes) a scan observes.
 struct DegeneracyAnalysis {
   int degenerate_directions = 0;            ///< 0..6
-  Vector6d eigenvalues = Vector6d::Zero();  ///< mean squared sensitivity per point, ascending; 1/3 is well observed
-  Vector6d noise = Vector6d::Zero();        ///< the part of each eigenvalue that errors of the normals explain
+  Vector6d eigenvalues = Vector6d::Zero();  ///< mean squared sensitivity per point of each direction looked at
+  Vector6d noise = Vector6d::Zero();        ///< the part of each that errors of the normals explain
+  std::array<bool, 6> blind{};              ///< which of them are degenerate
   /// Degenerate unit directions in scaled coordinates: (length x attitude, position).
   std::vector<Vector6d> degenerate;
   /// What corrects the state: keeps a direction of the pose error by the square root of the share of its sensitivity
@@ -38,6 +49,20 @@ struct DegeneracyAnalysis {
 /// the projection; the subtraction of the expected noise is the usual correction for errors in variables.
 [[nodiscard]] DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6d& noise,
                                                     const DegeneracyLimits& limits);
+
+/// The same for given orthonormal directions, the columns of `basis`; `needed` is the signal to noise that each needs.
+///
+/// A degenerate direction that is mostly a shift is taken for a pure shift, which is what it is: with the attitude
+/// fixed, parallel walls say nothing about the way along them. The bit of attitude that noise mixes in would tie the
+/// two together, turn the vehicle as it goes and, by gravity, accelerate it.
+[[nodiscard]] DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivity& scan,
+                                                  const std::array<double, 6>& needed, double min_sensitivity);
+
+/// What a blind shift adds to the covariance of the other shifts [m^2]. The direction itself is known to a degree or so
+/// only, and a vehicle that is off by metres along a corridor is off by centimetres across it, in a map that has the
+/// same error. `position_covariance` in odom axes.
+[[nodiscard]] Eigen::Matrix3d tilt_of_blind_shifts(const DegeneracyAnalysis& analysis,
+                                                   const Eigen::Matrix3d& position_covariance);
 
 /// The degenerate directions for people: each by its larger part, position in odom axes or attitude in body axes. Empty
 /// when there are none.

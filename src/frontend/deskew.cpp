@@ -14,15 +14,17 @@ namespace {
 struct Segment {
   Utime begin = 0;
   Utime end = 0;
-  Eigen::Quaterniond q_end_begin = Eigen::Quaterniond::Identity();
+  Eigen::Matrix3d R_end_begin = Eigen::Matrix3d::Identity();
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< [rad/s] body axes
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< [m] at begin
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< [m/s] at begin
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< [m/s^2]
 
   [[nodiscard]] Eigen::Vector3d at(double dt, const Eigen::Vector3d& point) const {
-    const Eigen::Vector3d turned = so3::exp(dt * rate) * point;
-    return q_end_begin * turned + position + dt * velocity + (0.5 * dt * dt) * acceleration;
+    const Eigen::Vector3d phi = dt * rate;
+    const bool is_little = phi.squaredNorm() < 0.25;
+    const Eigen::Vector3d turned = is_little ? so3::rotate_a_little(phi, point) : so3::exp(phi) * point;
+    return R_end_begin * turned + position + dt * velocity + (0.5 * dt * dt) * acceleration;
   }
 };
 
@@ -31,7 +33,7 @@ Segment make_segment(const NavState& before, const NavState& after, const NavSta
   Segment segment;
   segment.begin = before.utime;
   segment.end = after.utime;
-  segment.q_end_begin = q_end_odom * before.T_odom_body.rotation;
+  segment.R_end_begin = (q_end_odom * before.T_odom_body.rotation).toRotationMatrix();
   segment.rate = before.angular_rate;
   segment.position = q_end_odom * (before.T_odom_body.translation - end.T_odom_body.translation);
   segment.velocity = q_end_odom * before.v_odom;

@@ -54,12 +54,13 @@ struct FrontendConfig {
   double velocity_known_sigma = 0.5;
   double full_observability = 1e-4;
   bool adapt_measurement_noise = true;
-  double noise_prior_points = 20.0;
-  double residual_inflation = 4.0;
+  double noise_prior_points = 5.0;
+  double residual_inflation = 1.0;
+  double blind_residual_inflation = 4.0;
   double degeneracy_threshold = 1e-5;
   double degeneracy_signal_to_noise = 1.6;
   int map_average_points = 1;
-  double map_drift = 1.0;
+  double map_drift = 4.0;
   double wide_match_radius_m = 0.0;
   double imu_timeout_s = 0.5;
   double degraded_sigma_m = 0.15;
@@ -175,6 +176,8 @@ struct FrontendConfig {
                  "weight of measurement_noise in that estimate");
     visit.number("residual_inflation", self.residual_inflation, {1.0, 100.0}, "1",
                  "factor on the residuals' variance: points that share a plane share its error");
+    visit.number("blind_residual_inflation", self.blind_residual_inflation, {1.0, 100.0}, "1",
+                 "the same while a direction is not observed: then errors of the normals weigh more");
     visit.number("degeneracy_threshold", self.degeneracy_threshold, {0.0, 0.3}, "1",
                  "mean squared sensitivity per point below which a direction is left to the IMU");
     visit.number(
@@ -183,8 +186,9 @@ struct FrontendConfig {
         "IMU");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
-    visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",
-                 "factor on the variance that each scan leaves in the published covariance for good");
+    visit.number(
+        "map_drift", self.map_drift, {0.0, 1000.0}, "1",
+        "factor on the variance, without inflation, that each scan leaves in the published covariance for good");
     visit.number("wide_match_radius_m", self.wide_match_radius_m, {0.0, 10.0}, "m",
                  "neighbour radius for points that find too few within match_radius_m; 0: none");
     visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",

@@ -34,7 +34,7 @@ void Keyframer::add_imu(const ImuSample& sample) {
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
                                             std::vector<CloudPoint> cloud) {
   const NavState& state = filter.nominal;
-  recent_.push_back({state.utime, state.T_odom_body, voxel_downsample(cloud, config_.voxel_size_m)});
+  recent_.push_back({state.utime, state.T_odom_body, std::move(cloud)});
   const Utime oldest = state.utime - to_micros(config_.keyframe_cloud_seconds);
   while (recent_.front().utime <= oldest) recent_.pop_front();
 

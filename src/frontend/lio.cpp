@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "frontend/deskew.h"
+#include "frontend/reacquisition.h"
 #include "frontend/scan_selection.h"
 #include "frontend/standstill.h"
 #include "frontend/voxel_downsample.h"
@@ -20,6 +21,7 @@ constexpr std::int64_t kCoastingStepUs = 10'000;           // between samples th
 constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sample the biases learn nothing
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
 constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
+constexpr int kScansUntilReacquisition = 5;                // without a correction
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
@@ -69,6 +71,7 @@ void Lio::reset() {
   velocity_known_ = false;
   applied_scans_ = 0;
   contradictions_ = 0;
+  scans_without_correction_ = 0;
   trust_ = TrustMonitor(config_);
   last_clipped_.reset();
   last_standstill_.reset();
@@ -183,20 +186,22 @@ ScanResult Lio::process(const Scan& scan) {
   const ScanSelection selection = select_points(scan, config_);
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
-  MatchResult match = correct(cloud);
+  std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m);
+  MatchResult match = correct(cloud, sparse);
   match.stats.points = selection.in_range;
   filter_ = match.filter;
   if (last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs) keep_biases(predicted);
   if (match.stats.applied()) {
     const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable);
     if (update.ok) cautious_ = update.covariance;
-    drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans);
+    drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans * match.inflation);
   }
   if (match.stats.applied()) ++applied_scans_;
+  scans_without_correction_ = match.stats.applied() ? 0 : scans_without_correction_ + 1;
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
   match.stats.imu_disagreement = trust_.disagreement();
-  follow_moving_start(selection.scan, match.stats.reason, cloud);
+  follow_moving_start(selection.scan, match.stats.reason, cloud, sparse);
   grow_map(cloud, match.stats.reason);
 
   ScanResult result;
@@ -209,13 +214,16 @@ ScanResult Lio::process(const Scan& scan) {
   result.has_state = true;
   result.state = filter_.nominal;
   result.covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
+  result.covariance.block<3, 3>(kPosition, kPosition) +=
+      tilt_of_blind_shifts(match.degeneracy, result.covariance.block<3, 3>(kPosition, kPosition));
   if (velocity_known_)
-    result.keyframe = keyframer_.add_scan({filter_.nominal, result.covariance}, match.information_body, cloud);
+    result.keyframe =
+        keyframer_.add_scan({filter_.nominal, result.covariance}, match.information_body, std::move(sparse));
   result.cloud = std::move(cloud);
   return result;
 }
 
-MatchResult Lio::correct(const std::vector<CloudPoint>& cloud) {
+MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse) {
   MatchResult result;
   result.filter = filter_;
   if (std::ssize(cloud) < config_.min_scan_points) {
@@ -225,17 +233,23 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud) {
   } else if (map_.empty()) {
     result.stats.reason = ScanReason::kMapEmpty;
   } else {
-    const std::vector<Eigen::Vector3f> points = positions(thin(cloud, config_.voxel_size_m, config_.max_scan_points));
-    result = matcher_.match(filter_, points, map_);
+    const bool is_large = std::ssize(cloud) > config_.max_scan_points;
+    const std::vector<Eigen::Vector3f> points =
+        positions(is_large ? every_nth(sparse, config_.max_scan_points) : cloud);
+    const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
+    const Pose T_start = is_lost ? reacquire(filter_, points, map_, config_) : filter_.nominal.T_odom_body;
+    result = matcher_.match(filter_, T_start, points, map_);
   }
   return result;
 }
 
-void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud) {
+void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,
+                              std::vector<CloudPoint>& sparse) {
   if (velocity_known_) return;
   if (reason == ScanReason::kApplied) {
     // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
     cloud = register_points(scan);
+    sparse = voxel_downsample(cloud, config_.voxel_size_m);
     map_.clear();
     velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
   } else if (is_contradiction(reason)) {
@@ -257,6 +271,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {
 void Lio::begin_new_map() {
   map_.clear();
   contradictions_ = 0;
+  scans_without_correction_ = 0;
   ++session_;
   keyframer_ = Keyframer(config_, session_);
   trust_.note_loss();
@@ -296,7 +311,7 @@ void Lio::use_standstill(ScanStats& stats) {
   if (!standstill) return;
   stats.standing = true;
   // Windows that overlap share the noise of their samples.
-  if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillHalfWindowUs) return;
+  if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2) return;
   last_standstill_ = filter_.nominal.utime;
   FilterState cautious{filter_.nominal, cautious_};
   correct_to_standstill(cautious, *standstill);

@@ -69,9 +69,10 @@ class Lio {
   [[nodiscard]] std::vector<ScanResult> process_pending();
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
-  [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud);
+  [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse);
   void grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason);
-  void follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud);
+  void follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,
+                           std::vector<CloudPoint>& sparse);
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
   void begin_new_map();
   void coast_to(Utime utime);
@@ -103,6 +104,7 @@ class Lio {
   bool velocity_known_ = false;
   int applied_scans_ = 0;
   int contradictions_ = 0;                ///< in a row
+  int scans_without_correction_ = 0;      ///< in a row
   std::optional<Utime> last_standstill_;  ///< instant of the last correction to zero velocity
   std::optional<Utime> last_clipped_;     ///< instant of the newest sample that says nothing about the biases
 };

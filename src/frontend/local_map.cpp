@@ -6,6 +6,8 @@
 #include <bit>
 #include <cmath>
 
+#include "common/grid.h"
+
 namespace ignis {
 namespace {
 
@@ -36,7 +38,7 @@ constexpr AxisMasks make_axis_masks() {
 constexpr AxisMasks kAxisMasks = make_axis_masks();
 
 Eigen::Vector3i voxel_of(const Eigen::Vector3d& point, double voxel_size) {
-  return (point / voxel_size).array().floor().cast<int>().matrix();
+  return cell_of<double>(point / voxel_size);
 }
 
 /// The mask along one axis of the voxels lo..hi (global indices) inside the block `block`.
@@ -151,14 +153,12 @@ bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vecto
   return (point - centre).squaredNorm() < (stored - centre).squaredNorm();
 }
 
-NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius) const {
+void LocalMap::for_each_near(const Eigen::Vector3d& query, double radius, auto&& visit) const {
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius);
   const Eigen::Vector3i lo = voxel_of(query - reach, voxel_size_);
   const Eigen::Vector3i hi = voxel_of(query + reach, voxel_size_);
   const auto radius2 = static_cast<float>(radius * radius);
   const double block_size = kEdge * voxel_size_;
-
-  NeighbourMoments moments;
   for (int z = lo.z() >> kEdgeBits; z <= hi.z() >> kEdgeBits; ++z) {
     const std::uint64_t mask_z = axis_mask(2, z, lo.z(), hi.z());
     for (int y = lo.y() >> kEdgeBits; y <= hi.y() >> kEdgeBits; ++y) {
@@ -171,12 +171,28 @@ NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius) c
              left &= left - 1) {
           const int bit = std::countr_zero(left);
           const Eigen::Vector3f offset = Eigen::Map<const Eigen::Vector3f>(block->local[bit]) - origin;
-          if (offset.squaredNorm() <= radius2) moments.add(offset.cast<double>(), block->scan[bit]);
+          if (offset.squaredNorm() <= radius2) visit(offset, *block, bit);
         }
       }
     }
   }
+}
+
+NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius) const {
+  NeighbourMoments moments;
+  for_each_near(query, radius, [&](const Eigen::Vector3f& offset, const Block& block, int bit) {
+    moments.add(offset.cast<double>(), block.scan[bit]);
+  });
   return moments;
+}
+
+std::optional<Eigen::Vector3d> LocalMap::nearest(const Eigen::Vector3d& query, double radius) const {
+  std::optional<Eigen::Vector3f> best;
+  for_each_near(query, radius, [&](const Eigen::Vector3f& offset, const Block&, int) {
+    if (!best || offset.squaredNorm() < best->squaredNorm()) best = offset;
+  });
+  if (!best) return std::nullopt;
+  return query + best->cast<double>();
 }
 
 void LocalMap::slide(const Eigen::Vector3d& position) {

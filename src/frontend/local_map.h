@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,9 @@ class LocalMap {
   /// The same for the match radius.
   [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query) const { return gather(query, match_radius_); }
 
+  /// The confirmed point nearest a point, within a radius [m]. Costs what gather costs: for rare use.
+  [[nodiscard]] std::optional<Eigen::Vector3d> nearest(const Eigen::Vector3d& query, double radius) const;
+
   /// Drops what left the window, once the vehicle has moved a quarter of the window since the last time.
   void slide(const Eigen::Vector3d& position);
 
@@ -59,6 +63,8 @@ class LocalMap {
     std::uint16_t weight[kVoxels];  ///< points in the mean
   };
 
+  /// Calls visit(offset from the query [m], block, bit) for every confirmed point within a radius.
+  void for_each_near(const Eigen::Vector3d& query, double radius, auto&& visit) const;
   [[nodiscard]] const Block* find(const Eigen::Vector3i& coordinate) const;
   [[nodiscard]] Block& find_or_add(const Eigen::Vector3i& coordinate);
   void insert_point(const Eigen::Vector3d& point, bool confirmed);

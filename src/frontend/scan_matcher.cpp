@@ -39,23 +39,27 @@ ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), wide_c
   wide_config_.max_curvature /= 3.0;
 }
 
-MatchResult ScanMatcher::match(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
-                               const LocalMap& map) {
+MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start,
+                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
   MatchResult result;
   result.filter = predicted;
-  associate(predicted.nominal.T_odom_body, points_body, map);
+  result.filter.nominal.T_odom_body = T_start;
+  associate(T_start, points_body, map);
   result.stats.matched = static_cast<int>(constraints_.size());
   if (result.stats.matched < config_.min_matches) {
     result.stats.reason = ScanReason::kTooFewMatches;
+    result.filter = predicted;
     return result;
   }
-  const Assessment assessment = assess(predicted);
+  const Assessment assessment = assess(result.filter);
   find_observed_directions(assessment, map);
   result.stats.mean_innovation = assessment.mean_innovation;
   result.stats.observability = assessment.observability;
   const bool iterated = iterate(predicted, points_body, map, result);
   result.stats.degenerate_directions = degeneracy_.degenerate_directions;
   result.stats.unobserved = describe(degeneracy_);
+  result.inflation = inflation();
+  result.degeneracy = degeneracy_;
   result.map_age_scans = map.scans() + 1.0 - mean_map_scan_;
   result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
   if (!result.stats.applied()) {
@@ -133,13 +137,17 @@ void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
   }
 }
 
+double ScanMatcher::inflation() const {
+  return degeneracy_.degenerate_directions > 0 ? config_.blind_residual_inflation : config_.residual_inflation;
+}
+
 double ScanMatcher::point_variance(const Pose& pose) const {
   if (!config_.adapt_measurement_noise) return config_.measurement_noise;
   // Posterior mean of a variance whose prior is the configured value, worth `noise_prior_points` observations.
   double sum = config_.noise_prior_points * config_.measurement_noise;
   for (const Constraint& constraint : constraints_) {
     const double z = constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance;
-    sum += config_.residual_inflation * z * z;
+    sum += inflation() * z * z;
   }
   const double variance = sum / (config_.noise_prior_points + static_cast<double>(constraints_.size()));
   return std::min(variance, config_.measurement_noise);
@@ -163,7 +171,7 @@ PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_c
 bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
                           const LocalMap& map, MatchResult& result) {
   FilterState& iterate = result.filter;
-  Pose associated_at = predicted.nominal.T_odom_body;
+  Pose associated_at = iterate.nominal.T_odom_body;
   Matrix15d gate_covariance = predicted.covariance;
   for (int pass = 0; pass < config_.iterations; ++pass) {
     const Vector6d moved = body_difference(associated_at, iterate.nominal.T_odom_body);

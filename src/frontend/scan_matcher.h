@@ -23,7 +23,9 @@ struct MatchResult {
   Matrix6d information_body = Matrix6d::Zero();
   /// The same as sum over the points, order and axes of PoseInformation: what the covariance may rely on.
   PoseInformation reliable;
-  double map_age_scans = 1.0;  ///< mean age of the map points that the scan met
+  DegeneracyAnalysis degeneracy;  ///< which directions that leaves open
+  double inflation = 1.0;         ///< of the residuals' variance that went into it
+  double map_age_scans = 1.0;     ///< mean age of the map points that the scan met
 };
 
 /// Corrects a predicted state by matching deskewed points against planes of the local map: assessment, quality gate,
@@ -33,8 +35,9 @@ class ScanMatcher {
  public:
   explicit ScanMatcher(const FrontendConfig& config);
 
-  [[nodiscard]] MatchResult match(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
-                                  const LocalMap& map);
+  /// `T_start`: where to look for planes first; the predicted pose, unless that is too far off (see reacquire).
+  [[nodiscard]] MatchResult match(const FilterState& predicted, const Pose& T_start,
+                                  std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
 
  private:
   /// A point and the plane that it was associated with. The plane stays over the passes until the iterate has moved.
@@ -57,6 +60,7 @@ class ScanMatcher {
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);
+  [[nodiscard]] double inflation() const;
   [[nodiscard]] double point_variance(const Pose& pose) const;
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;

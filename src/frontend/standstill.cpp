@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kMaxVelocitySigma = 0.1;  // m/s: above it the filter cannot tell standing from rolling
 constexpr double kSigmas = 3.0;
-constexpr std::ptrdiff_t kMinSamples = 4;  // in each half of the window
+constexpr std::ptrdiff_t kMinSamples = 4;          // that a quiet window needs
+constexpr Utime kDelayUs = kMicrosPerSecond / 10;  // between standing and the correction that it leads to
 
 struct Quiet {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s] mean
@@ -51,12 +52,12 @@ double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
   return std::sqrt(covariance.diagonal().segment<3>(block).maxCoeff());
 }
 
-/// Velocity at the middle of the window by integration back from now, attitude and biases held.
-Standstill at_middle(std::span<const ImuSample> late_half, const FilterState& filter, const FrontendConfig& config) {
+/// Velocity before the newest samples, by integration back over them, attitude and biases held.
+Standstill before_newest(std::span<const ImuSample> newest, const FilterState& filter, const FrontendConfig& config) {
   const NavState& state = filter.nominal;
-  const double seconds = 1e-6 * static_cast<double>(kStandstillHalfWindowUs);
+  const double seconds = 1e-6 * static_cast<double>(kDelayUs);
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  for (const ImuSample& sample : late_half) force += sample.accel / static_cast<double>(late_half.size());
+  for (const ImuSample& sample : newest) force += sample.accel / static_cast<double>(newest.size());
   force -= state.accel_bias;
   const Eigen::Matrix3d R = state.T_odom_body.rotation.toRotationMatrix();
   Standstill standstill;
@@ -75,19 +76,19 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
                                           const FrontendConfig& config) {
   const NavState& state = filter.nominal;
   const double velocity_sigma = largest_sigma(filter.covariance, kVelocity);
-  const double speed_limit = std::min(config.stationary_speed + 2.0 * velocity_sigma, 3.0 * config.stationary_speed);
+  const double speed_limit =
+      std::min(config.stationary_speed + kSigmas * velocity_sigma, 4.0 * config.stationary_speed);
   if (velocity_sigma > kMaxVelocitySigma || state.v_odom.norm() > speed_limit) return std::nullopt;
 
-  const auto begin =
-      std::ranges::lower_bound(samples, state.utime - 2 * kStandstillHalfWindowUs, {}, &ImuSample::utime);
-  const auto middle = std::ranges::lower_bound(samples, state.utime - kStandstillHalfWindowUs, {}, &ImuSample::utime);
+  const auto begin = std::ranges::lower_bound(samples, state.utime - kStandstillWindowUs, {}, &ImuSample::utime);
+  const auto newest = std::ranges::lower_bound(samples, state.utime - kDelayUs, {}, &ImuSample::utime);
   const auto end = std::ranges::upper_bound(samples, state.utime, {}, &ImuSample::utime);
-  if (begin == samples.begin() || middle - begin < kMinSamples || end - middle < kMinSamples) return std::nullopt;
+  if (begin == samples.begin() || newest - begin < kMinSamples || newest == end) return std::nullopt;
   const std::span<const ImuSample> window(begin, end);
   if (std::ranges::any_of(window, &ImuSample::saturated)) return std::nullopt;
 
   const Quiet quiet = summarise(window);
-  const double seconds = 2e-6 * static_cast<double>(kStandstillHalfWindowUs);
+  const double seconds = 1e-6 * static_cast<double>(kStandstillWindowUs);
   const double gyro_limit =
       kSigmas * (config.imu_noise_gyro / std::sqrt(seconds) + largest_sigma(filter.covariance, kGyroBias));
   // The noise of a mean over half the window, twice: the difference of two such means.
@@ -96,7 +97,7 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
                      (quiet.gyro - state.gyro_bias).norm() <= gyro_limit && quiet.accel_drift.norm() <= drift_limit &&
                      std::abs((quiet.accel - state.accel_bias).norm() - config.gravity_m) <= config.rest_accel_band;
   if (!still) return std::nullopt;
-  return at_middle({middle, end}, filter, config);
+  return before_newest({newest, end}, filter, config);
 }
 
 void correct_to_standstill(FilterState& filter, const Standstill& standstill) {

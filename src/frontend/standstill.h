@@ -9,18 +9,18 @@
 
 namespace ignis {
 
-/// Half of the window that has to be quiet; standing is measured at its middle, so that a vehicle which has just set
-/// off is not held back before its acceleration shows.
-inline constexpr Utime kStandstillHalfWindowUs = kMicrosPerSecond / 4;
+/// Windows of this length have to be quiet; between two corrections there is half of one.
+inline constexpr Utime kStandstillWindowUs = kMicrosPerSecond / 2;
 
-/// What standing says about the velocity: v_odom + carry * error = 0 at the middle of the window.
+/// What standing says about the velocity: it was zero a tenth of a second ago. A vehicle that has just set off is
+/// so not held back before its acceleration shows.
 struct Standstill {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s] estimated at the middle of the window, odom axes
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s] estimated for that instant, odom axes
   Eigen::Matrix<double, 3, 15> derivative = Eigen::Matrix<double, 3, 15>::Zero();  ///< of it, by the error of the state
   double variance = 0.0;  ///< [m^2/s^2] per axis, of IMU noise between then and now and of `zero_velocity_sigma`
 };
 
-/// Something when the vehicle stood around a quarter of a second before `filter.nominal.utime`: IMU quiet within the
+/// Something when the vehicle stood during the half second before `filter.nominal.utime`: IMU quiet within the
 /// limits of a start at rest, no turn, no acceleration, and the filter is sure that it hardly moves. A steady drive on
 /// a smooth floor is as quiet as standing, so the IMU alone never decides.
 [[nodiscard]] std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstdint>
+
+#include "common/grid.h"
 
 namespace ignis {
 namespace {
@@ -64,9 +65,10 @@ std::vector<Point> nearest_to_centres(std::span<const Point> cloud, double voxel
   const float per_metre = 1.0F / edge;
   std::vector<Point> kept;
   for (const Point& point : cloud) {
-    const Eigen::Array3f index = (point.position * per_metre).array().floor();
-    const float distance2 = (point.position - ((index + 0.5F) * edge).matrix()).squaredNorm();
-    const std::uint64_t key = key_of(index.cast<int>().matrix());
+    const Eigen::Vector3i voxel = cell_of<float>(point.position * per_metre);
+    const Eigen::Vector3f centre = edge * (voxel.cast<float>().array() + 0.5F);
+    const float distance2 = (point.position - centre).squaredNorm();
+    const std::uint64_t key = key_of(voxel);
     Cell& cell = table.at(key);
     if (cell.index < 0) {
       cell = {key, static_cast<std::int32_t>(kept.size()), distance2};
@@ -89,14 +91,13 @@ std::vector<ScanPoint> voxel_downsample(std::span<const ScanPoint> cloud, double
   return nearest_to_centres(cloud, voxel_size_m);
 }
 
-std::vector<CloudPoint> thin(std::span<const CloudPoint> cloud, double voxel_size_m, int max_points) {
+std::vector<CloudPoint> every_nth(std::span<const CloudPoint> cloud, int max_points) {
   const auto bound = static_cast<std::size_t>(max_points);
   if (cloud.size() <= bound) return {cloud.begin(), cloud.end()};
-  std::vector<CloudPoint> kept = voxel_downsample(cloud, voxel_size_m);
-  if (kept.size() <= bound) return kept;
-  // Bresenham's rule picks exactly `bound` points, evenly spread over the order of the scan.
-  for (std::size_t i = 0; i < bound; ++i) kept[i] = kept[i * kept.size() / bound];
-  kept.resize(bound);
+  std::vector<CloudPoint> kept;
+  kept.reserve(bound);
+  // Bresenham's rule picks exactly `bound` points.
+  for (std::size_t i = 0; i < bound; ++i) kept.push_back(cloud[i * cloud.size() / bound]);
   return kept;
 }
 

@@ -13,7 +13,7 @@ namespace ignis {
 [[nodiscard]] std::vector<CloudPoint> voxel_downsample(std::span<const CloudPoint> cloud, double voxel_size_m);
 [[nodiscard]] std::vector<ScanPoint> voxel_downsample(std::span<const ScanPoint> cloud, double voxel_size_m);
 
-/// The cloud itself when it has at most `max_points`; otherwise voxel-downsampled, then every n-th point of that.
-[[nodiscard]] std::vector<CloudPoint> thin(std::span<const CloudPoint> cloud, double voxel_size_m, int max_points);
+/// At most `max_points` points of a cloud, evenly spread over its order.
+[[nodiscard]] std::vector<CloudPoint> every_nth(std::span<const CloudPoint> cloud, int max_points);
 
 }  // namespace ignis

@@ -2,7 +2,8 @@
 #include "map/voxel_level.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "common/grid.h"
 
 namespace ignis {
 namespace {
@@ -33,7 +34,7 @@ CellIndex VoxelLevel::unpack(Key key) {
 }
 
 CellIndex VoxelLevel::cell_of(const Eigen::Vector3d& p_world) const {
-  const auto axis = [this](double coordinate) { return static_cast<std::int32_t>(std::floor(coordinate / cell_m_)); };
+  const auto axis = [this](double coordinate) { return floor_to_int(coordinate / cell_m_); };
   return {axis(p_world.x()), axis(p_world.y()), axis(p_world.z())};
 }
 

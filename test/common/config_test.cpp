@@ -129,6 +129,20 @@ TEST(Config, SchemaStatesTypeRangeDefaultUnitAndMeaning) {
   EXPECT_EQ(schema["properties"]["parts"]["items"]["properties"]["width_m"]["minimum"], 0.1);
 }
 
+TEST(Config, AssignmentsSetNestedValuesOfAnyKindAndNameWhatIsNone) {
+  Json object = parse_json(R"({"a": {"b": 1, "kept": 2}})", "test");
+  Offences offences;
+  for (const char* assignment : {"a.b=2.5", "a.word=at_rest", "a.flag=true", "new.deep.list=[1, 2]", "top=\"=\""}) {
+    assign(object, assignment, offences);
+  }
+  EXPECT_TRUE(offences.empty());
+  EXPECT_EQ(object, parse_json(R"({"a": {"b": 2.5, "kept": 2, "word": "at_rest", "flag": true},
+                                   "new": {"deep": {"list": [1, 2]}}, "top": "="})",
+                               "test"));
+  for (const char* wrong : {"a.b", "=1", "a..b=1", "a.b.c=1", "a.b=", ""}) assign(object, wrong, offences);
+  EXPECT_EQ(offences.size(), 6U);
+}
+
 TEST(Config, ValidatorRefusesAStructThatWasFilledByHand) {
   Machine machine;
   machine.speed = std::nan("");

@@ -62,5 +62,13 @@ TEST(So3, RightJacobianInverseIsTheInverse) {
   }
 }
 
+TEST(So3, RotatingALittleEqualsTheExponential) {
+  for (const double angle : {0.0, 1e-9, 1e-3, 0.1, 0.3, 0.5}) {
+    const Eigen::Vector3d phi = angle * Eigen::Vector3d(0.6, -0.64, 0.48);
+    const Eigen::Vector3d point(3.0, -20.0, 50.0);
+    EXPECT_LT((so3::rotate_a_little(phi, point) - so3::exp(phi) * point).norm(), 1e-10 * point.norm()) << angle;
+  }
+}
+
 }  // namespace
 }  // namespace ignis

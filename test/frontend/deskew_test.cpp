@@ -112,12 +112,12 @@ TEST(VoxelDownsample, KeepsOnePointPerVoxelNearestItsCentre) {
   EXPECT_EQ(kept[1].intensity, 3.0F);
 }
 
-TEST(VoxelDownsample, ThinsLargeCloudsToTheBoundAndLeavesSmallOnesAlone) {
+TEST(EveryNth, ThinsLargeCloudsToTheBoundAndLeavesSmallOnesAlone) {
   std::vector<CloudPoint> cloud;
   for (int i = 0; i < 5000; ++i) cloud.push_back({{static_cast<float>(i), 0.0F, 0.0F}, 0.0F});
-  EXPECT_EQ(thin(cloud, 0.2, 1000).size(), 1000U);
-  EXPECT_EQ(thin(cloud, 0.2, 5000).size(), 5000U);
-  const auto thinned = thin(cloud, 0.2, 1000);
+  EXPECT_EQ(every_nth(cloud, 1000).size(), 1000U);
+  EXPECT_EQ(every_nth(cloud, 5000).size(), 5000U);
+  const auto thinned = every_nth(cloud, 1000);
   EXPECT_GT(thinned.back().position.x(), 4900.0F) << "evenly spread over the whole scan";
 }
 

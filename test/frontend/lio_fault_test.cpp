@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "frontend/lio.h"
 #include "frontend/lio_runner.h"
@@ -61,6 +62,33 @@ std::vector<ImuSample>::iterator sample_at(Drive& input, double seconds) {
   return std::ranges::lower_bound(input.imu, input.imu.front().utime + to_micros(seconds), {}, &ImuSample::utime);
 }
 
+/// Position error over its predicted sigma, per degree of freedom, mean over the scans after `seconds`.
+double position_nees(const Watched& run, double seconds) {
+  double sum = 0.0;
+  int count = 0;
+  for (const ScanResult& scan : run.scans) {
+    const double t = scan.has_state ? test::drive_seconds(drive(), scan.state.utime) : 0.0;
+    if (t < seconds) continue;
+    const Eigen::Vector3d error = drive().truth(t).translation - scan.state.T_odom_body.translation;
+    sum += error.dot(scan.covariance.block<3, 3>(kPosition, kPosition).inverse() * error) / 3.0;
+    ++count;
+  }
+  return sum / count;
+}
+
+TEST(Fault_F1, ShortImuGapsAreBridgedCountedAndCovered) {
+  for (const double gap : {0.02, 0.05, 0.1}) {
+    Drive input = drive();
+    for (const double at : {6.0, 8.0, 10.0, 12.0}) input.imu.erase(sample_at(input, at), sample_at(input, at + gap));
+    const Watched run(input);
+    EXPECT_EQ(run.lio.imu_counters().gaps, 4) << gap;
+    EXPECT_EQ(run.lio.session(), 0);
+    for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
+    EXPECT_LT(run.error_at_end(), 0.2) << gap;
+    EXPECT_LT(position_nees(run, 6.0), 9.35 / 3.0) << "97.5 % of chi-square with 3 degrees of freedom, one drive";
+  }
+}
+
 TEST(Fault_F2, ImuGoneForThreeSecondsIsBridgedByScansAndAnnounced) {
   Drive input = drive();
   input.imu.erase(sample_at(input, 8.0), sample_at(input, 11.0));
@@ -94,6 +122,93 @@ TEST(Fault_F3, AClippedAxisTeachesTheBiasesNothing) {
   EXPECT_GT((state_at(9.5).accel_bias - state_at(7.95).accel_bias).norm(), 0.0) << "one second later it learns again";
   for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
   EXPECT_LT(run.error_at_end(), 0.3);
+}
+
+TEST(Fault_F4, PointsThatAreNoNumbersLeaveTheResultBitIdentical) {
+  Drive input = drive();
+  constexpr float kBad[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30F};
+  for (std::size_t i = 100; i < 200; ++i) {
+    for (const float bad : kBad) {
+      std::vector<ScanPoint>& points = input.scans[i].points;
+      const std::size_t at = i * 7 % points.size();
+      ScanPoint point = points[at];
+      point.position[static_cast<Eigen::Index>(i % 3)] = bad;
+      points.insert(points.begin() + static_cast<std::ptrdiff_t>(at), point);
+    }
+  }
+  const Watched clean(drive());
+  const Watched dirty(input);
+  ASSERT_EQ(clean.scans.size(), dirty.scans.size());
+  for (std::size_t i = 0; i < clean.scans.size(); ++i) {
+    ASSERT_EQ(clean.scans[i].state.T_odom_body.translation, dirty.scans[i].state.T_odom_body.translation) << i;
+    ASSERT_EQ(clean.scans[i].covariance, dirty.scans[i].covariance) << i;
+  }
+}
+
+TEST(Fault_F6, ScansWithoutUsablePointsAreSkippedAndSoonLoseTheTrust) {
+  Drive input = drive();
+  const auto index_at = [&](double seconds) { return static_cast<std::size_t>(20.0 * seconds); };
+  for (std::size_t i = index_at(8.0); i < index_at(10.5); ++i) {
+    std::vector<ScanPoint>& points = input.scans[i].points;
+    if (i % 3 == 0) points.clear();
+    if (i % 3 == 1) points.resize(30);
+    if (i % 3 == 2) {
+      for (ScanPoint& point : points) point.position.setConstant(std::nanf(""));
+    }
+  }
+  const Watched run(input);
+  EXPECT_EQ(run.trust_at(7.9), Trust::kOk);
+  EXPECT_EQ(run.trust_at(8.4), Trust::kDegraded);
+  EXPECT_EQ(run.trust_at(10.3), Trust::kLost);
+  EXPECT_EQ(run.trust.back().second, Trust::kOk);
+  const auto skipped = std::ranges::count(run.scans, ScanReason::kTooFewPoints,
+                                          [](const ScanResult& result) { return result.stats.reason; });
+  EXPECT_EQ(skipped, 50);
+  EXPECT_EQ(run.lio.session(), 0) << "the map is still there and the next scan fits it";
+  EXPECT_LT(run.error_at_end(), 0.2) << "the prediction was 0.6 m off when the points came back";
+}
+
+TEST(Fault_F6, FourOfFiveSensorPointsMissingCostNoTrust) {
+  Drive input = drive();
+  for (Scan& scan : input.scans) {
+    std::vector<ScanPoint> kept;
+    for (std::size_t i = 0; i < scan.points.size(); i += 5) kept.push_back(scan.points[i]);
+    scan.points = std::move(kept);
+  }
+  const Watched run(input);
+  EXPECT_EQ(run.trust.back().second, Trust::kOk);
+  EXPECT_LT(run.error_at_end(), 0.2);
+}
+
+TEST(Fault_F7, AScanOfAMillionPointsIsMatchedWithTheConfiguredNumber) {
+  Drive input = drive();
+  Scan& scan = input.scans[200];
+  const std::vector<ScanPoint> once = scan.points;
+  while (scan.points.size() < 1'000'000) scan.points.insert(scan.points.end(), once.begin(), once.end());
+  FrontendConfig config = test::tuned_config();
+  config.max_scan_points = 1000;
+  config.scan_voxel_m = 0.05;
+  const Watched run(input, config);
+  const ScanResult& large =
+      *std::ranges::find(run.scans, scan.end_utime(), [](const ScanResult& r) { return r.stats.utime; });
+  EXPECT_TRUE(large.stats.applied());
+  EXPECT_GT(large.stats.points, 900'000);
+  EXPECT_LE(large.stats.matched, 1000);
+  EXPECT_LE(large.cloud.size(), once.size());
+  EXPECT_LT(run.error_at_end(), 0.2);
+}
+
+TEST(Fault_F8, PointTimesThatAreUnsortedOrOutsideTheScanAreClamped) {
+  Drive input = drive();
+  for (std::size_t i = 100; i < input.scans.size(); ++i) {
+    std::vector<ScanPoint>& points = input.scans[i].points;
+    std::ranges::reverse(points);
+    points[i % points.size()].dt_us = -5'000'000;
+    points[(i + 300) % points.size()].dt_us = 2'000'000'000;
+  }
+  const Watched run(input);
+  EXPECT_TRUE(run.scans.back().stats.applied());
+  EXPECT_LT(run.error_at_end(), 0.2);
 }
 
 TEST(Fault_F9, AStampOfTheFarFutureBlocksNothing) {

@@ -43,6 +43,23 @@ TEST(LocalMap, GathersExactlyWhatABruteForceSearchFinds) {
   }
 }
 
+TEST(LocalMap, FindsTheNearestConfirmedPointThatABruteForceSearchFinds) {
+  LocalMap map(FrontendConfig{});
+  map.insert(random_points(1, 3000, 4.0F), {}, true);
+  const std::vector<Eigen::Vector3d> all = map.points();
+  map.insert(random_points(5, 3000, 4.0F), {}, false);
+  for (const Eigen::Vector3f& offset : random_points(2, 200, 5.0F)) {
+    const Eigen::Vector3d query = offset.cast<double>();
+    const Eigen::Vector3d expected =
+        *std::ranges::min_element(all, {}, [&](const Eigen::Vector3d& point) { return (point - query).squaredNorm(); });
+    const std::optional<Eigen::Vector3d> found = map.nearest(query, 1.0);
+    ASSERT_EQ(found.has_value(), (expected - query).norm() <= 1.0);
+    if (found) {
+      EXPECT_NEAR((*found - query).norm(), (expected - query).norm(), 1e-5);
+    }
+  }
+}
+
 TEST(LocalMap, KeepsThePointNearestTheVoxelCentre) {
   LocalMap map(FrontendConfig{});
   map.insert(std::vector<Eigen::Vector3f>{{0.01F, 0.01F, 0.01F}, {0.11F, 0.1F, 0.1F}, {0.15F, 0.1F, 0.1F}}, {}, true);

@@ -40,6 +40,19 @@ def test_effective_configuration_is_printed_and_read_back(name, run_binary, tmp_
     assert again.stdout == printed.stdout
 
 
+def test_assignments_win_over_the_file_and_are_checked_like_it(run_binary, tmp_path: Path) -> None:
+    config = tmp_path / "file.json"
+    config.write_text('{"frontend": {"iterations": 3, "voxel_size_m": 0.4}}')
+    changes = ["--set", "frontend.iterations=7", "--set", "frontend.start=moving"]
+    printed = run_binary("lio_replay", "--config", config, *changes, "--print-config")
+    frontend = json.loads(printed.stdout)["frontend"]
+    assert (frontend["iterations"], frontend["start"], frontend["voxel_size_m"]) == (7, "moving", 0.4)
+    wrong = ["--set", "frontend.iterations=0", "--set", "frontend.voxel_sice_m=1", "--set", "nonsense"]
+    message = refusal(run_binary("lio_replay", *wrong, "--print-config"), 2)
+    for part in ("iterations = 0", 'did you mean "voxel_size_m"', "nonsense"):
+        assert part in message
+
+
 @pytest.mark.parametrize(("content", "expected"), [("", "not valid JSON"), ("{", "not valid JSON"), ("[]", "object")])
 def test_broken_configuration_is_named(content: str, expected: str, run_binary, tmp_path: Path) -> None:
     config = tmp_path / "broken.json"

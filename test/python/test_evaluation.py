@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""NEES of made-up replays whose errors are drawn from the covariance they state."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ignis.errors import InputError
+from ignis.evaluate import Row, Variant, table
+from ignis.evaluation.consistency import band, nees_of
+from ignis.evaluation.drives import Simulation, _changed_scene
+from ignis.poses import Poses, Trajectory, quaternion_from_matrix, write_tum
+
+
+def _rotation(vector: np.ndarray) -> np.ndarray:
+    angle = np.linalg.norm(vector)
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def _replay(folder: Path, seed: int, inflation: float) -> Trajectory:
+    """A folder of a replay with errors `inflation` times what it says; returns the truth, which starts off level."""
+    random = np.random.default_rng(seed)
+    count = 400
+    utime = np.arange(count) * 50_000 + 1_000_000
+    root = 0.02 * random.normal(size=(6, 6)) + 0.01 * np.eye(6)
+    covariance = root @ root.T
+    start = Poses(np.array([[5.0, 1.0, -3.0]]), quaternion_from_matrix(_rotation(np.array([0.0, 0.7, 0.0])))[None])
+    position, quaternion, true_position, true_quaternion = [], [], [], []
+    for i in range(count):
+        p, R = np.array([0.0, 0.0, -0.05 * i]), _rotation(np.array([0.0, 0.002 * i, 0.0]))
+        error = inflation * root @ random.normal(size=6) if i > 0 else np.zeros(6)
+        position.append(p)
+        quaternion.append(quaternion_from_matrix(R))
+        true_position.append(p + error[3:])
+        true_quaternion.append(quaternion_from_matrix(R @ _rotation(error[:3])))
+    folder.mkdir()
+    write_tum(folder / "eskf.tum", Trajectory(utime, Poses(np.array(position), np.array(quaternion))))
+    upper = covariance[np.triu_indices(6)]
+    names = [f"p{i}{k}" for i, k in zip(*np.triu_indices(6), strict=True)]
+    rows = [",".join(map(str, [t, *upper])) for t in utime]
+    (folder / "eskf_states.csv").write_text("\n".join([",".join(["utime", *names]), *rows]) + "\n")
+    seen = start[np.zeros(count, dtype=int)] @ Poses(np.array(true_position), np.array(true_quaternion))
+    return Trajectory(utime, seen)
+
+
+def test_nees_is_one_when_errors_are_what_the_covariance_says(tmp_path: Path) -> None:
+    position, attitude = nees_of(tmp_path / "a", _replay(tmp_path / "a", 1, 1.0))
+    assert position == pytest.approx(1.0, abs=0.2)
+    assert attitude == pytest.approx(1.0, abs=0.2)
+
+
+def test_nees_is_the_square_of_how_much_larger_the_errors_are(tmp_path: Path) -> None:
+    position, attitude = nees_of(tmp_path / "a", _replay(tmp_path / "a", 1, 3.0))
+    assert position == pytest.approx(9.0, rel=0.2)
+    assert attitude == pytest.approx(9.0, rel=0.25)
+
+
+def test_band_narrows_with_the_number_of_drives() -> None:
+    few, many = band(3), band(60)
+    assert few[0] < many[0] < 1.0 < many[1] < few[1]
+
+
+def test_changed_scene_keeps_its_geometry_within_reach(tmp_path: Path) -> None:
+    scenes, work = tmp_path / "scenes", tmp_path / "work" / "deep"
+    scenes.mkdir()
+    (scenes / "hall.json").write_text("{}")
+    (scenes / "quick.json").write_text('{"geometry": "hall.json", "imu": {"gyro_bias_walk": 1}}')
+    changed = _changed_scene(scenes / "quick.json", ["imu.gyro_bias_walk=2", "lidar.range_noise_m=0.02"], work)
+    content = json.loads(changed.read_text())
+    assert (changed.parent / content["geometry"]).resolve() == (scenes / "hall.json").resolve()
+    assert content["imu"]["gyro_bias_walk"] == 2
+    assert content["lidar"] == {"range_noise_m": 0.02}
+    with pytest.raises(InputError, match=r"section\.key=value"):
+        _changed_scene(scenes / "quick.json", ["nonsense"], work)
+
+
+def test_table_lists_drives_in_order_and_means_over_seeds() -> None:
+    def row(seed: int, nees: float) -> Row:
+        figures = dict.fromkeys(
+            ("ate_m", "smoothed_ate_m", "drift_percent", "applied_percent", "named_percent", "scan_p50_ms"), 0.5
+        )
+        figures |= {"rpe_10m_m": None, "loops": 2, "nees_position": nees, "nees_attitude": 1.0, "scan_p99_ms": 2.0}
+        return Row(Simulation("hall", seed, Path("a"), Path("b")), Variant("plain"), figures)
+
+    text = table([row(2, 3.0), row(1, 1.0)])
+    assert text.index("hall, 1") < text.index("hall, 2")
+    assert "| hall | plain | 2.00 | 1.00 |" in text
