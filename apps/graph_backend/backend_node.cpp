@@ -2,7 +2,9 @@
 #include "backend_node.h"
 
 #include <format>
+#include <iostream>
 
+#include "ignis/graph_command_t.hpp"
 #include "runtime/channels.h"
 
 namespace ignis {
@@ -12,83 +14,131 @@ using runtime::LcmLink;
 namespace channels = runtime::channels;
 
 constexpr int kPollMs = 100;
+constexpr int kCommandQueue = 100;
 constexpr Utime kSmoothedStatePeriod = 20'000;  // [us]
-constexpr std::chrono::milliseconds kRequestPeriod{300};
 constexpr std::chrono::seconds kFullPeriod{2};  // late joiners get the whole set within this time
-constexpr std::size_t kMaxIdsPerRequest = 16;
-constexpr int kMaxRequests = 20;  // for one gap; then the front end has it no longer either
+
+/// A command that changes nothing is answered too.
+SmootherUpdate answered(SmootherUpdate update, const graph_command_t& command) {
+  const auto is_about_it = [&](const LoopResult& loop) {
+    return loop.from_id == command.from_id && loop.to_id == command.to_id;
+  };
+  if (update.loop || std::ranges::any_of(update.changed, is_about_it)) return update;
+  LoopResult answer;
+  answer.utime = update.newest.utime;
+  answer.from_id = command.from_id;
+  answer.to_id = command.to_id;
+  answer.reason_text = command.command == graph_command_t::VETO_LOOP ? "vetoed; there was no such loop"
+                                                                     : "there is no such loop to withdraw";
+  update.loop = answer;
+  return update;
+}
 
 }  // namespace
 
-BackendNode::BackendNode(const runtime::Application& application) : config_(application.config), link_(application) {
+BackendNode::BackendNode(const runtime::Application& application, const std::filesystem::path& journal_folder)
+    : config_(application.config), link_(application), graph_(config_, journal_folder) {
+  if (!graph_.resume_note().empty()) std::cerr << "graph_backend: " << graph_.resume_note() << std::endl;
+  T_map_odom_ = graph_.smoother().T_map_odom();
   keyframe_counts_ = &link_.subscribe<keyframe_t>(channels::kKeyframe, config_.lcm.keyframe_queue,
                                                   [this](const keyframe_t& part) { on_keyframe_part(part); });
   link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,
                            [this](const state_t& message) { on_state(message); });
+  link_.subscribe<graph_command_t>(
+      channels::kGraphCommand, kCommandQueue, [this](const graph_command_t& command) { on_command(command); },
+      runtime::Senders::kSeveral);
 }
 
 void BackendNode::spin_once() {
   link_.handle(kPollMs);
   request_missing_keyframes();
-  if (smoother_ && std::chrono::steady_clock::now() - last_full_ > kFullPeriod) {
-    SmootherUpdate everything = last_update_;
-    everything.moved = smoother_->all_poses();
-    publish_revision(everything, true);
-  }
+  follow_shadow();
+  graph_.maintain();
+  const bool has_keyframes = !graph_.smoother().all_poses().empty();
+  if (has_keyframes && std::chrono::steady_clock::now() - last_full_ > kFullPeriod) publish_full_set();
   publish_health();
 }
 
 void BackendNode::on_keyframe_part(const keyframe_t& part) {
   std::optional<Keyframe> keyframe = assembler_.add(part);
   if (!keyframe) return;
-  if (keyframe->session != session_) begin_session(keyframe->session);
-  if (keyframe->id < smoother_->expected_id()) return;  // a repeat that somebody else asked for
-  waiting_.insert_or_assign(keyframe->id, std::move(*keyframe));
+  if (keyframe->session != graph_.session() || graph_.smoother().is_of_another_drive(*keyframe)) {
+    begin_session(keyframe->session);
+  }
+  if (keyframe->id < graph_.smoother().expected_id()) return;  // a repeat that somebody else asked for
+  inbox_.put(std::move(*keyframe));
   add_waiting_keyframes();
 }
 
 void BackendNode::begin_session(std::int32_t session) {
-  session_ = session;
-  waiting_.clear();
-  smoother_ = std::make_unique<Smoother>(config_.backend, config_.frontend.loop_gates);
+  graph_.begin_session(session);
+  inbox_.clear();
   T_map_odom_ = Pose{};
-  fault_.clear();
+  last_update_ = {};
+  refusal_.clear();
 }
 
 void BackendNode::add_waiting_keyframes() {
-  while (!waiting_.empty() && waiting_.begin()->first <= smoother_->expected_id()) {
-    const Keyframe keyframe = std::move(waiting_.begin()->second);
-    waiting_.erase(waiting_.begin());
-    take_keyframe(keyframe);
+  while (std::optional<Keyframe> keyframe = inbox_.take(graph_.smoother().expected_id())) {
+    const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.add_keyframe(*keyframe); });
+    newest_utime_ = std::max(newest_utime_, keyframe->state.utime);
+    refusal_ = update.accepted() ? "" : std::format("keyframe {} refused: {}", keyframe->id, update.reason);
+    if (update.accepted()) publish_update(update);
   }
 }
 
-void BackendNode::take_keyframe(const Keyframe& keyframe) {
-  const SmootherUpdate update = smoother_->add_keyframe(keyframe);
-  newest_utime_ = std::max(newest_utime_, keyframe.state.utime);
-  fault_ = update.accepted() ? "" : std::format("keyframe {} refused: {}", keyframe.id, update.reason);
-  if (update.accepted()) publish_update(update, keyframe);
+void BackendNode::on_command(const graph_command_t& command) {
+  if (command.session != -1 && command.session != graph_.session()) return;
+  if (command.command == graph_command_t::SEND_FULL_SET) {
+    publish_full_set();
+    return;
+  }
+  const SmootherUpdate update = graph_.change([&](Smoother& smoother) {
+    return command.command == graph_command_t::VETO_LOOP ? smoother.veto_loop(command.from_id, command.to_id)
+                                                         : smoother.withdraw_loop(command.from_id, command.to_id);
+  });
+  publish_update(answered(update, command));
 }
 
-void BackendNode::publish_update(const SmootherUpdate& update, const Keyframe& keyframe) {
+/// After loops have entered or left, a batch solve in the background tells how far the incremental solution is from the
+/// optimum.
+void BackendNode::follow_shadow() {
+  if (const std::optional<ShadowOptimum> optimum = shadow_.take()) {
+    const int swaps = graph_.smoother().stats().shadow_swaps;
+    const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(*optimum); });
+    if (graph_.smoother().stats().shadow_swaps != swaps) publish_update(update);
+  }
+  if (loop_changes_ == shadowed_loops_changes_ || !shadow_.idle()) return;
+  shadowed_loops_changes_ = loop_changes_;
+  shadow_.start(graph_.shadow_problem());
+}
+
+void BackendNode::publish_update(const SmootherUpdate& update) {
   last_update_ = update;
-  last_update_.newest.utime = keyframe.state.utime;
   T_map_odom_ = update.T_map_odom;
-  publish_revision(last_update_, false);
+  publish_revision(update, false);
   if (update.loop) publish_loop(*update.loop);
-  for (const LoopResult& withdrawn : update.withdrawn) publish_loop(withdrawn);
+  for (const LoopResult& changed : update.changed) publish_loop(changed);
+  loop_changes_ += static_cast<int>(update.changed.size()) + (update.loop && update.loop->accepted() ? 1 : 0);
+}
+
+void BackendNode::publish_full_set() {
+  SmootherUpdate everything = last_update_;
+  everything.moved = graph_.smoother().all_poses();
+  publish_revision(everything, true);
 }
 
 void BackendNode::publish_revision(const SmootherUpdate& update, bool full) {
   if (full) last_full_ = std::chrono::steady_clock::now();
+  const Smoother& smoother = graph_.smoother();
   messages::GraphRevision revision;
   revision.utime = newest_utime_;
-  revision.session = session_;
-  revision.revision = smoother_->revision();
+  revision.session = graph_.session();
+  revision.revision = smoother.revision();
   revision.full = full;
-  revision.keyframes = smoother_->stats().keyframes;
-  revision.newest_id = smoother_->expected_id() - 1;
-  revision.T_map_odom = smoother_->T_map_odom();
+  revision.keyframes = smoother.stats().keyframes;
+  revision.newest_id = smoother.expected_id() - 1;
+  revision.T_map_odom = smoother.T_map_odom();
   revision.covariance = update.covariance;
   revision.poses = update.moved;
   for (smoothed_keyframes_t& message : messages::to_messages(revision)) {
@@ -99,56 +149,57 @@ void BackendNode::publish_revision(const SmootherUpdate& update, bool full) {
 }
 
 void BackendNode::publish_loop(const LoopResult& result) {
-  loop_result_t message = messages::to_message(result, session_);
+  loop_result_t message = messages::to_message(result, graph_.session());
   message.sequence = loop_sequence_++;
   link_.publish(channels::kLoopResult, message);
 }
 
 void BackendNode::on_state(const state_t& message) {
-  if (message.session != session_ || message.utime < last_smoothed_utime_ + kSmoothedStatePeriod) return;
+  if (message.session != graph_.session() || message.utime < last_smoothed_utime_ + kSmoothedStatePeriod) return;
   last_smoothed_utime_ = message.utime;
   NavState state = messages::from_message(message);
   state.T_odom_body = T_map_odom_ * state.T_odom_body;
   state.v_odom = T_map_odom_.rotation * state.v_odom;
-  state_t smoothed = messages::to_message(state, session_, "map");
+  state_t smoothed = messages::to_message(state, graph_.session(), "map");
   smoothed.sequence = state_sequence_++;
   link_.publish(channels::kSmoothedState, smoothed);
 }
 
 void BackendNode::request_missing_keyframes() {
-  if (waiting_.empty()) return;
-  const auto now = std::chrono::steady_clock::now();
-  if (now - last_request_ < kRequestPeriod) return;
-  last_request_ = now;
-  if (requested_id_ != smoother_->expected_id()) requests_ = 0;
-  requested_id_ = smoother_->expected_id();
-  if (++requests_ > kMaxRequests) {
-    smoother_->accept_gap_before(waiting_.begin()->first);
+  if (graph_.session() < 0) return;
+  const std::int32_t expected = graph_.smoother().expected_id();
+  if (const std::optional<std::int32_t> hopeless = inbox_.hopeless_before(expected)) {
+    graph_.accept_gap_before(*hopeless);
     add_waiting_keyframes();
     return;
   }
   keyframe_request_t request{};
+  request.ids = inbox_.ids_to_request(expected, std::chrono::steady_clock::now());
+  if (request.ids.empty()) return;
   request.utime = newest_utime_;
   request.sequence = request_sequence_++;
-  request.session = session_;
+  request.session = graph_.session();
   request.sender = "graph_backend";
-  for (std::int32_t id = smoother_->expected_id();
-       id < waiting_.rbegin()->first && request.ids.size() < kMaxIdsPerRequest; ++id) {
-    if (!waiting_.contains(id)) request.ids.push_back(id);
-  }
   request.num_ids = static_cast<std::int32_t>(request.ids.size());
   link_.publish(channels::kKeyframeRequest, request);
 }
 
 void BackendNode::publish_health() {
   keyframe_counts_->queue_drops = assembler_.incomplete();
-  if (!fault_.empty()) {
-    link_.report_health(newest_utime_, health_t::DEGRADED, fault_);
-  } else if (!waiting_.empty()) {
+  const SmootherStats stats = graph_.smoother().stats();
+  if (!refusal_.empty()) {
+    link_.report_health(newest_utime_, health_t::DEGRADED, refusal_);
+  } else if (const std::string failure = graph_.failure(); !failure.empty()) {
+    link_.report_health(newest_utime_, health_t::DEGRADED, failure);
+  } else if (!inbox_.empty()) {
     link_.report_health(newest_utime_, health_t::DEGRADED,
-                        std::format("waiting for keyframe {}", smoother_->expected_id()));
+                        std::format("waiting for keyframe {}", graph_.smoother().expected_id()));
+  } else if (stats.shadow_checks > 0) {
+    link_.report_health(newest_utime_, health_t::OK,
+                        std::format("OK: {:.1f} mm and {:.2f} mrad from the batch optimum at most; swapped {} times",
+                                    1e3 * stats.shadow_gap_m, 1e3 * stats.shadow_gap_rad, stats.shadow_swaps));
   } else {
-    link_.report_health(newest_utime_, health_t::OK, smoother_ ? "OK" : "OK: no keyframe yet");
+    link_.report_health(newest_utime_, health_t::OK, stats.keyframes > 0 ? "OK" : "OK: no keyframe yet");
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// l1_sim: drives an L1 through a scene and emits its bytes, into a file or in real time to a driver that it obeys.
+// l1_sim: drives an L1 through a scene and emits its bytes, into a file or in real time to a driver that it obeys. A
+// scene with a spinning LiDAR goes into a log.
 
 #include <format>
 #include <iostream>
@@ -12,6 +13,7 @@
 #include "pty_line.h"
 #include "runtime/stop_signal.h"
 #include "scene_summary.h"
+#include "spinning_log.h"
 #include "udp_line.h"
 
 namespace {
@@ -55,6 +57,11 @@ runtime::ExitCode run(const Options& options, const runtime::Application& applic
   if (options.print_scene) {
     std::cout << summary(scene);
     return runtime::kDone;
+  }
+  if (scene.lidar.is_spinning()) {
+    require_log_only(options);
+    sim::SpinningStream stream(scene, application.config.extrinsics, options.seed, options.duration_s);
+    return write_spinning_log(stream, options.files, application);
   }
   sim::L1Stream stream(scene, application.config.extrinsics, options.seed, options.duration_s, options.device);
   sim::ByteFaults faults(options.faults, options.fault_seed);

@@ -108,6 +108,25 @@ void add_options(CLI::App& app, Options& options) {
       ->group("Faults of the line");
 }
 
+void require_log_only(const Options& options) {
+  std::string given;
+  const auto note = [&](const char* name, bool is_given) {
+    if (is_given) given += std::format("{}{}", given.empty() ? "" : ", ", name);
+  };
+  const sim::DeviceConfig usual;
+  note("--capture", !options.files.bytes.empty());
+  note("--pty", !options.pty.empty());
+  note("--udp", !options.udp.empty());
+  note("--fault", !options.fault_texts.empty());
+  note("--fault-list", !options.fault_list.empty());
+  note("--id-modulus", options.device.id_modulus != usual.id_modulus);
+  if (given.empty()) return;
+  throw runtime::UserError(
+      std::format("the scene {} has a spinning LiDAR, and only an L1 has bytes: {} cannot be used; write measurements "
+                  "with --log FILE",
+                  options.scene, given));
+}
+
 Options checked(Options options) {
   if (options.print_scene) return options;
   config::Offences offences;

@@ -38,4 +38,8 @@ void add_options(CLI::App& app, Options& options);
 /// The options with everything filled in. Throws runtime::UserError that names every fault of the command line.
 [[nodiscard]] Options checked(Options options);
 
+/// For a scene whose LiDAR is no L1, so that there are no bytes to send or to spoil and no device to command. Throws
+/// runtime::UserError that names every option that asks for one.
+void require_log_only(const Options& options);
+
 }  // namespace ignis

@@ -78,11 +78,13 @@ void write_states(const std::filesystem::path& file, const ReplayResult& result)
 void write_loops(const std::filesystem::path& file, const ReplayResult& result) {
   FileOutput output(file);
   output.stream() << "utime,from_id,to_id,accepted,reason,candidates,passed,correction_m,correction_rad,"
-                     "mean_residual_m,matched_fraction\n";
+                     "mean_residual_m,matched_fraction,overlap,stage,chi_square,chi_square_bound\n";
   for (const LoopResult& loop : result.loops) {
-    output.stream() << std::format("{},{},{},{},\"{}\",{},{},{:.6f},{:.6f},{:.6f},{:.4f}\n", loop.utime, loop.from_id,
-                                   loop.to_id, loop.accepted() ? 1 : 0, text(loop.reason), loop.candidates, loop.passed,
-                                   loop.correction_m, loop.correction_rad, loop.mean_residual, loop.matched_fraction);
+    output.stream() << std::format("{},{},{},{},\"{}\",{},{},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},\"{}\",{:.3f},{:.3f}\n",
+                                   loop.utime, loop.from_id, loop.to_id, loop.accepted() ? 1 : 0, text(loop.reason),
+                                   loop.candidates, loop.passed, loop.correction_m, loop.correction_rad,
+                                   loop.mean_residual, loop.matched_fraction, loop.overlap, text(loop.stage),
+                                   loop.chi_square, loop.chi_square_bound);
   }
   output.commit();
 }
@@ -139,6 +141,12 @@ Json report(const runtime::Application& application, const std::filesystem::path
   json["loops_accepted"] = accepted;
   json["loops_kept"] = result.smoother.loops_kept;
   json["loops_withdrawn"] = result.smoother.loops_withdrawn;
+  json["batch_optimum"] = {{"solved", result.optimum.solved},
+                           {"largest_gap_m", result.optimum.largest_gap_m},
+                           {"largest_gap_rad", result.optimum.largest_gap_rad},
+                           {"half_chi_square", result.optimum.half_chi_square},
+                           {"half_chi_square_incremental", result.optimum.half_chi_square_before},
+                           {"swapped_in", result.smoother.shadow_swaps > 0}};
   json["solver_rebuilds"] = result.smoother.solver_rebuilds;
   json["voxels"] = {{"local", pipeline.voxels().level(0).size()},
                     {"mid", pipeline.voxels().level(1).size()},

@@ -46,14 +46,17 @@ void ReplayPipeline::take_keyframe(const Keyframe& sent) {
     const SmootherUpdate update = backend_timer_.time([&] { return smoother_.add_keyframe(*keyframe); });
     keyframes_[keyframe->id] = {keyframe->state.utime, keyframe->state.T_odom_body, keyframe->state.T_odom_body};
     if (update.loop) result_.loops.push_back(*update.loop);
-    result_.loops.insert(result_.loops.end(), update.withdrawn.begin(), update.withdrawn.end());
+    result_.loops.insert(result_.loops.end(), update.changed.begin(), update.changed.end());
     if (update.accepted()) correct_map(update);
   }
 }
 
 void ReplayPipeline::correct_map(const SmootherUpdate& update) {
   if (update.loop && update.loop->accepted()) map_.add_loop(update.loop->from_id, update.loop->to_id);
-  for (const LoopResult& loop : update.withdrawn) map_.remove_loop(loop.from_id, loop.to_id);
+  for (const LoopResult& loop : update.changed) {
+    if (loop.accepted()) map_.add_loop(loop.from_id, loop.to_id);
+    if (loop.reason == LoopReason::kWithdrawn) map_.remove_loop(loop.from_id, loop.to_id);
+  }
   std::vector<CorrectedPose> poses;
   poses.reserve(update.moved.size());
   for (const KeyframePose& pose : update.moved) poses.push_back({pose.id, pose.T_map_body});
@@ -69,6 +72,8 @@ void ReplayPipeline::rebuild_map() {
 }
 
 ReplayResult ReplayPipeline::finish() {
+  result_.optimum = solve(smoother_.shadow_problem());
+  correct_map(smoother_.adopt(result_.optimum));
   rebuild_map();
   std::vector<KeyframeCorrection> corrections;
   for (const KeyframePose& pose : smoother_.all_poses()) {

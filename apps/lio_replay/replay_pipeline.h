@@ -32,7 +32,8 @@ struct ReplayResult {
   Trajectory smoothed;                 ///< on the same stamps, frame map
   PoseGraph graph;
   SmootherStats smoother;
-  std::string start;  ///< what the front end says about its start
+  ShadowOptimum optimum;  ///< how far the incremental solution was from the batch optimum at the end
+  std::string start;      ///< what the front end says about its start
   std::int64_t imu_samples = 0;
   std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
 };

@@ -12,6 +12,7 @@ inline constexpr char kScanStats[] = "LIO_SCAN_STATS";
 inline constexpr char kCloud[] = "LIO_CLOUD";
 inline constexpr char kKeyframe[] = "LIO_KEYFRAME";
 inline constexpr char kKeyframeRequest[] = "KEYFRAME_REQUEST";
+inline constexpr char kGraphCommand[] = "GRAPH_COMMAND";
 inline constexpr char kSmoothedKeyframes[] = "SMOOTHED_KEYFRAMES";
 inline constexpr char kSmoothedState[] = "SMOOTHED_STATE";
 inline constexpr char kLoopResult[] = "LOOP_RESULT";

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "backend/incremental_solver.h"
 #include "backend/loop_matcher.h"
 #include "backend/preintegration.h"
@@ -24,9 +26,9 @@ struct BackendConfig {
   double prior_accel_bias = 0.1;
 
   // Relative pose from scan matching.
-  double scan_information_scale = 0.2;
-  double odometry_floor_m = 0.01;
-  double odometry_floor_rad = 0.001;
+  double scan_information_scale = 1.0;
+  double odometry_floor_m = 0.001;
+  double odometry_floor_rad = 0.0002;
 
   // What links two keyframes when the IMU does not.
   double loose_position_m = 0.5;
@@ -40,9 +42,21 @@ struct BackendConfig {
   int loop_min_spacing = 2;
   int loop_max_candidates = 3;
   double loop_noise_inflation = 5.0;
-  double loop_floor_m = 0.02;
-  double loop_floor_rad = 0.003;
+  double loop_floor_m = 0.01;
+  double loop_floor_rad = 0.0015;
+  double loop_residual_weight = 2.0;
   double loop_consistency_probability = 0.999;
+  double loop_min_travel_m = 1.0;
+  double loop_widening_sigmas = 3.0;
+  double loop_max_widening_m = 8.0;
+  std::string loop_correction_gate = "distance";
+  double loop_drift_scale = 2.0;
+  double loop_support_beyond_m = 2.0;
+  int loop_trial_keyframes = 10;
+
+  // Batch solution that checks the incremental one.
+  double shadow_swap_m = 0.01;
+  double shadow_swap_rad = 0.001;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.section("imu", self.imu, "noise of the inertial unit as the graph assumes it");
@@ -78,8 +92,30 @@ struct BackendConfig {
                  "sigma of an independent position error of a loop");
     visit.number("loop_floor_rad", self.loop_floor_rad, {1e-7, 1.0}, "rad",
                  "sigma of an independent attitude error of a loop");
+    visit.number(
+        "loop_residual_weight", self.loop_residual_weight, {0.0, 100.0}, "1",
+        "both sigmas grow with the match's mean residual, the position's by so many times the residual: surfaces "
+        "that do not fit are moved or blurred, and pull the match with them");
     visit.number("loop_consistency_probability", self.loop_consistency_probability, {0.5, 0.9999999}, "1",
-                 "a loop is withdrawn when its chi-square exceeds this quantile");
+                 "a loop is refused or withdrawn when its chi-square exceeds this quantile");
+    visit.number("loop_min_travel_m", self.loop_min_travel_m, {0.0, 1000.0}, "m",
+                 "way from one accepted loop to the next search: a parked vehicle has nothing new to tell");
+    visit.number("loop_widening_sigmas", self.loop_widening_sigmas, {0.0, 10.0}, "1",
+                 "the candidate test reaches farther by so many sigmas of the odometry's drift; 0: it does not");
+    visit.number("loop_max_widening_m", self.loop_max_widening_m, {0.0, 100.0}, "m", "but at most by this");
+    visit.choice("loop_correction_gate", self.loop_correction_gate, {"distance", "covariance"},
+                 "what bounds the correction of a loop: frontend.loop_max_correction_m besides the chi-square test "
+                 "against the odometry's drift, or that test alone");
+    visit.number("loop_drift_scale", self.loop_drift_scale, {0.1, 100.0}, "1",
+                 "factor on the sigmas of the odometry's drift and of loops when they are tested against each other: "
+                 "their errors are correlated");
+    visit.number("loop_support_beyond_m", self.loop_support_beyond_m, {0.01, 1000.0}, "m",
+                 "a loop about whose place odometry is less sure than this waits until a second one agrees with it");
+    visit.integer("loop_trial_keyframes", self.loop_trial_keyframes, {1, 10000}, "keyframes",
+                  "a loop on trial that so many later keyframes do not contradict is kept");
+    visit.number("shadow_swap_m", self.shadow_swap_m, {1e-6, 10.0}, "m",
+                 "the batch solution replaces the incremental one when a position differs by more");
+    visit.number("shadow_swap_rad", self.shadow_swap_rad, {1e-7, 1.0}, "rad", "the same for an attitude");
   }
 };
 

@@ -5,6 +5,7 @@
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/linear/linearExceptions.h>
 #include <gtsam/nonlinear/ISAM2.h>
+#include <gtsam/nonlinear/Marginals.h>
 
 #include <cmath>
 #include <format>
@@ -25,6 +26,9 @@ gtsam::ISAM2Params parameters(const SolverConfig& config) {
   gtsam::ISAM2Params params;
   params.relinearizeThreshold = thresholds;
   params.relinearizeSkip = config.relinearize_skip;
+  // The usual 0.001 stops back-substitution while poses are still a millimetre off; then a solver that is built anew
+  // from the same factors would stand elsewhere.
+  params.optimizationParams = gtsam::ISAM2GaussNewtonParams(config.wildfire_threshold);
   params.findUnusedFactorSlots = false;  // factor indices must stay what they were
   return params;
 }
@@ -80,7 +84,6 @@ struct IncrementalSolver::Impl {
   /// A new iSAM2 from the living factors at the last good solution. Should even that fail, the solver keeps its last
   /// solution and refuses everything from then on.
   void rebuild() {
-    ++rebuilds;
     isam = gtsam::ISAM2(params);
     gtsam::NonlinearFactorGraph living;
     std::vector<FactorId> ids;
@@ -96,6 +99,11 @@ struct IncrementalSolver::Impl {
       return;
     }
     for (std::size_t i = 0; i < ids.size(); ++i) isam_index[ids[i]] = indices[i];
+  }
+
+  void recover() {
+    ++rebuilds;
+    rebuild();
   }
 
   const gtsam::Values& estimate() {
@@ -132,7 +140,7 @@ SolverOutcome IncrementalSolver::add(const gtsam::NonlinearFactorGraph& factors,
   gtsam::FactorIndices indices;
   outcome.reason = impl_->update(factors, values, {}, indices);
   if (!outcome.reason.empty()) {
-    impl_->rebuild();
+    impl_->recover();
     return outcome;
   }
   for (std::size_t i = 0; i < factors.size(); ++i) {
@@ -160,7 +168,7 @@ SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
   for (const FactorId id : factors) impl_->factors[id].reset();
   gtsam::FactorIndices none;
   outcome.reason = impl_->update({}, {}, removed, none);
-  if (!outcome.reason.empty()) impl_->rebuild();
+  if (!outcome.reason.empty()) impl_->recover();
   outcome.accepted = true;
   return outcome;
 }
@@ -169,7 +177,7 @@ bool IncrementalSolver::settle(int updates) {
   for (int i = 0; i < updates && impl_->broken.empty(); ++i) {
     gtsam::FactorIndices none;
     if (!impl_->update({}, {}, {}, none).empty()) {
-      impl_->rebuild();
+      impl_->recover();
       return false;
     }
   }
@@ -177,6 +185,10 @@ bool IncrementalSolver::settle(int updates) {
 }
 
 const gtsam::Values& IncrementalSolver::estimate() { return impl_->estimate(); }
+
+const gtsam::Values& IncrementalSolver::linearisation_points() const {
+  return impl_->broken.empty() ? impl_->isam.getLinearizationPoint() : impl_->values;
+}
 
 gtsam::Pose3 IncrementalSolver::pose(std::uint64_t key) const {
   return impl_->broken.empty() ? impl_->isam.calculateEstimate<gtsam::Pose3>(key) : impl_->values.at<gtsam::Pose3>(key);
@@ -204,6 +216,44 @@ std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint6
     // The covariance is an extra: without it the pose still stands.
     return std::nullopt;
   }
+}
+
+std::vector<Matrix6d> IncrementalSolver::relative_covariances(
+    std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs) {
+  std::vector<Matrix6d> covariances;
+  try {
+    const gtsam::Values& values = estimate();
+    const gtsam::Marginals marginals(living_factors(), values);
+    for (const auto& [from, to] : pairs) {
+      const gtsam::JointMarginal joint = marginals.jointMarginalCovariance({from, to});
+      const gtsam::Matrix6 A = -values.at<gtsam::Pose3>(to).between(values.at<gtsam::Pose3>(from)).AdjointMap();
+      const gtsam::Matrix6 cross = A * joint(from, to);
+      covariances.emplace_back(A * joint(from, from) * A.transpose() + joint(to, to) + cross + cross.transpose());
+    }
+  } catch (const std::exception&) {
+    return {};
+  }
+  return covariances;
+}
+
+gtsam::NonlinearFactorGraph IncrementalSolver::living_factors() const {
+  gtsam::NonlinearFactorGraph living;
+  for (const auto& factor : impl_->factors) {
+    if (factor) living.push_back(factor);
+  }
+  return living;
+}
+
+bool IncrementalSolver::restart_at(const gtsam::Values& values) {
+  if (!impl_->broken.empty()) return false;
+  const gtsam::Values before = impl_->estimate();
+  impl_->values = values;
+  impl_->rebuild();
+  if (impl_->broken.empty()) return true;
+  impl_->broken.clear();
+  impl_->values = before;
+  impl_->rebuild();
+  return false;
 }
 
 int IncrementalSolver::rebuilds() const { return impl_->rebuilds; }

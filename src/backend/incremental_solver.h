@@ -7,9 +7,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/config_fields.h"
+#include "common/pose.h"
 
 namespace gtsam {
 class NonlinearFactorGraph;
@@ -27,6 +29,7 @@ struct SolverConfig {
   double relinearize_velocity = 0.05;
   double relinearize_bias = 0.01;
   int relinearize_skip = 1;
+  double wildfire_threshold = 1e-6;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.number("relinearize_position_m", self.relinearize_position_m, {1e-6, 1.0}, "m",
@@ -36,6 +39,8 @@ struct SolverConfig {
     visit.number("relinearize_bias", self.relinearize_bias, {1e-7, 10.0}, "m/s^2 or rad/s", "the same, biases");
     visit.integer("relinearize_skip", self.relinearize_skip, {1, 100}, "updates",
                   "updates between checks of the thresholds");
+    visit.number("wildfire_threshold", self.wildfire_threshold, {0.0, 0.1}, "m, rad, m/s, ...",
+                 "smallest change of a variable that is passed on to its neighbours");
   }
 };
 
@@ -74,6 +79,10 @@ class IncrementalSolver {
   /// The current solution; valid until the next call that changes the graph.
   [[nodiscard]] const gtsam::Values& estimate();
 
+  /// Where the factors are linearised. A solver that begins with these values and the same factors has the same
+  /// solution.
+  [[nodiscard]] const gtsam::Values& linearisation_points() const;
+
   /// One pose of it, without the cost of all the others. The variable must exist.
   [[nodiscard]] gtsam::Pose3 pose(std::uint64_t key) const;
 
@@ -83,6 +92,18 @@ class IncrementalSolver {
 
   /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
   [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
+
+  /// Covariances of the relative poses of pairs of pose variables, in body axes of the second of each, by one batch
+  /// elimination: tens of milliseconds for hundreds of poses. Empty when they cannot be computed.
+  [[nodiscard]] std::vector<Matrix6d> relative_covariances(
+      std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs);
+
+  /// The factors in the graph. They are immutable, so copies of the list share them.
+  [[nodiscard]] gtsam::NonlinearFactorGraph living_factors() const;
+
+  /// Linearises everything anew at `values`, which must hold every variable. False when the solver refused them; then
+  /// it goes on from where it was.
+  [[nodiscard]] bool restart_at(const gtsam::Values& values);
 
   /// Times that iSAM2 had to be built anew.
   [[nodiscard]] int rebuilds() const;

@@ -53,21 +53,21 @@ gtsam::SharedNoiseModel bias_noise(double accel_sigma, double gyro_sigma) {
   return Diagonal::Sigmas(sigmas);
 }
 
-void add_imu(const Keyframe& keyframe, const LinkEnd& previous, const BackendConfig& config,
-             gtsam::NonlinearFactorGraph& factors) {
-  const gtsam::PreintegratedCombinedMeasurements sum =
-      preintegrate(keyframe.imu, previous.utime, keyframe.state.utime, previous.estimate, config.imu);
-  factors.emplace_shared<gtsam::CombinedImuFactor>(X(previous.id), V(previous.id), X(keyframe.id), V(keyframe.id),
-                                                   B(previous.id), B(keyframe.id), sum);
+void add_first_factors(const KeyframeLink& link, const BackendConfig& config, gtsam::NonlinearFactorGraph& factors) {
+  const NavState& state = link.guess;
+  factors.addPrior(X(link.id), to_gtsam(state.T_odom_body),
+                   gtsam::noiseModel::Gaussian::Covariance(first_pose_covariance(state.T_odom_body, config)));
+  factors.addPrior(V(link.id), gtsam::Vector3(state.v_odom), Isotropic::Sigma(3, link.velocity_sigma));
+  factors.addPrior(B(link.id), bias_of(state), bias_noise(config.prior_accel_bias, config.prior_gyro_bias));
 }
 
-void add_loose_links(const Keyframe& keyframe, const LinkEnd& previous, const Pose& T_previous_this,
-                     const gtsam::Vector3& v_map, const BackendConfig& config, gtsam::NonlinearFactorGraph& factors) {
-  const double root_time = std::sqrt(std::max(1e-3, seconds_between(previous.utime, keyframe.state.utime)));
-  factors.push_back(make_relative_pose_factor(X(previous.id), X(keyframe.id), T_previous_this, loose_rows(config)));
-  factors.addPrior(V(keyframe.id), v_map, Isotropic::Sigma(3, config.loose_velocity));
+void add_loose_factors(const KeyframeLink& link, const BackendConfig& config, gtsam::NonlinearFactorGraph& factors) {
+  const double root_time = std::sqrt(std::max(1e-3, link.interval_s));
+  factors.push_back(
+      make_relative_pose_factor(X(link.previous_id), X(link.id), link.T_previous_this, loose_rows(config)));
+  factors.addPrior(V(link.id), gtsam::Vector3(link.guess.v_odom), Isotropic::Sigma(3, config.loose_velocity));
   factors.emplace_shared<gtsam::BetweenFactor<ConstantBias>>(
-      B(previous.id), B(keyframe.id), ConstantBias(),
+      B(link.previous_id), B(link.id), ConstantBias(),
       bias_noise(config.imu.accel_bias_walk * root_time, config.imu.gyro_bias_walk * root_time));
 }
 
@@ -80,41 +80,59 @@ WhiteningRows loose_rows(const BackendConfig& config) {
   return whitening(information.asDiagonal());
 }
 
-void add_first_keyframe(const Keyframe& keyframe, const BackendConfig& config, gtsam::NonlinearFactorGraph& factors,
-                        gtsam::Values& values) {
-  const NavState& state = keyframe.state;
-  const gtsam::Pose3 T_map_body = to_gtsam(state.T_odom_body);
-  const gtsam::Vector3 v_map = keyframe.stationary ? gtsam::Vector3(gtsam::Z_3x1) : gtsam::Vector3(state.v_odom);
-  const double velocity_sigma =
-      keyframe.stationary ? config.stationary_velocity : first_velocity_sigma(keyframe, config);
-  values.insert(X(keyframe.id), T_map_body);
-  values.insert(V(keyframe.id), v_map);
-  values.insert(B(keyframe.id), bias_of(state));
-  factors.addPrior(X(keyframe.id), T_map_body,
-                   gtsam::noiseModel::Gaussian::Covariance(first_pose_covariance(state.T_odom_body, config)));
-  factors.addPrior(V(keyframe.id), v_map, Isotropic::Sigma(3, velocity_sigma));
-  factors.addPrior(B(keyframe.id), bias_of(state), bias_noise(config.prior_accel_bias, config.prior_gyro_bias));
+KeyframeLink first_link(const Keyframe& keyframe, const BackendConfig& config) {
+  KeyframeLink link;
+  link.id = keyframe.id;
+  link.stationary = keyframe.stationary;
+  link.guess = keyframe.state;
+  if (keyframe.stationary) link.guess.v_odom.setZero();
+  link.velocity_sigma = keyframe.stationary ? config.stationary_velocity : first_velocity_sigma(keyframe, config);
+  return link;
 }
 
-void add_next_keyframe(const Keyframe& keyframe, const LinkEnd& previous, bool use_imu, const WhiteningRows& odometry,
-                       const BackendConfig& config, gtsam::NonlinearFactorGraph& factors, gtsam::Values& values) {
-  const Pose T_previous_this = previous.T_odom_body.inverse() * keyframe.state.T_odom_body;
+KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool use_imu, const WhiteningRows& odometry,
+                       const BackendConfig& config) {
+  KeyframeLink link;
+  link.id = keyframe.id;
+  link.previous_id = previous.id;
+  link.stationary = keyframe.stationary;
+  link.interval_s = seconds_between(previous.utime, keyframe.state.utime);
+  link.T_previous_this = previous.T_odom_body.inverse() * keyframe.state.T_odom_body;
+  link.odometry = odometry;
   const Pose T_map_odom = previous.estimate.T_odom_body * previous.T_odom_body.inverse();
-  const gtsam::Vector3 v_map = T_map_odom.rotation * keyframe.state.v_odom;
-  values.insert(X(keyframe.id), to_gtsam(previous.estimate.T_odom_body * T_previous_this));
-  values.insert(V(keyframe.id), v_map);
-  values.insert(B(keyframe.id), bias_of(previous.estimate));
+  link.guess = previous.estimate;
+  link.guess.T_odom_body = previous.estimate.T_odom_body * link.T_previous_this;
+  link.guess.v_odom = T_map_odom.rotation * keyframe.state.v_odom;
   if (use_imu) {
-    add_imu(keyframe, previous, config, factors);
+    link.imu =
+        plain_sum(preintegrate(keyframe.imu, previous.utime, keyframe.state.utime, previous.estimate, config.imu));
+  }
+  return link;
+}
+
+void add_link_factors(const KeyframeLink& link, const BackendConfig& config, gtsam::NonlinearFactorGraph& factors) {
+  if (link.previous_id < 0) {
+    add_first_factors(link, config, factors);
+    return;
+  }
+  if (link.imu) {
+    factors.emplace_shared<gtsam::CombinedImuFactor>(X(link.previous_id), V(link.previous_id), X(link.id), V(link.id),
+                                                     B(link.previous_id), B(link.id), sum_of(*link.imu, config.imu));
   } else {
-    add_loose_links(keyframe, previous, T_previous_this, v_map, config, factors);
+    add_loose_factors(link, config, factors);
   }
-  if (odometry.rows() > 0) {
-    factors.push_back(make_relative_pose_factor(X(previous.id), X(keyframe.id), T_previous_this, odometry));
+  if (link.odometry.rows() > 0) {
+    factors.push_back(make_relative_pose_factor(X(link.previous_id), X(link.id), link.T_previous_this, link.odometry));
   }
-  if (keyframe.stationary) {
-    factors.addPrior(V(keyframe.id), gtsam::Vector3(gtsam::Z_3x1), Isotropic::Sigma(3, config.stationary_velocity));
+  if (link.stationary) {
+    factors.addPrior(V(link.id), gtsam::Vector3(gtsam::Z_3x1), Isotropic::Sigma(3, config.stationary_velocity));
   }
+}
+
+void insert_estimate(std::int32_t id, const NavState& state, gtsam::Values& values) {
+  values.insert(X(id), to_gtsam(state.T_odom_body));
+  values.insert(V(id), gtsam::Vector3(state.v_odom));
+  values.insert(B(id), bias_of(state));
 }
 
 NavState estimate_of(const gtsam::Values& values, std::int32_t id) {

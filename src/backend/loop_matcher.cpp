@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <format>
+#include <numbers>
 #include <optional>
 #include <vector>
 
 #include "backend/plane_map.h"
+#include "backend/view_grid.h"
 #include "common/so3.h"
 
 namespace ignis {
@@ -21,14 +23,14 @@ constexpr double kKernelPerRadius = 0.2;     // width of the Cauchy kernel relat
 constexpr double kAgreeingCosine = 0.87;     // 30 degrees between a point's own normal and the map's
 constexpr double kWallCosine = 0.5;          // a surface whose normal is at least 60 degrees from the body's up
 
-/// A point of the keyframe that looks, and the direction of the surface it lies on, where that is known.
-struct SourcePoint {
+/// A point and the direction of the surface it lies on, where that is known.
+struct SurfacePoint {
   Eigen::Vector3d position;
   std::optional<Eigen::Vector3d> normal;
 
   [[nodiscard]] bool on_wall() const { return normal && std::abs(normal->y()) < kWallCosine; }
-  [[nodiscard]] bool agrees_with(const Eigen::Vector3d& n_source) const {
-    return !normal || std::abs(normal->dot(n_source)) > kAgreeingCosine;
+  [[nodiscard]] bool agrees_with(const Eigen::Vector3d& other) const {
+    return !normal || std::abs(normal->dot(other)) > kAgreeingCosine;
   }
 };
 
@@ -43,12 +45,12 @@ struct NormalEquations {
   int walls_matched = 0;
 };
 
-NormalEquations accumulate(std::span<const SourcePoint> source, PlaneMap& map, const Pose& T_map_source,
+NormalEquations accumulate(std::span<const SurfacePoint> source, PlaneMap& map, const Pose& T_map_source,
                            double radius_m) {
   const double kernel = kKernelPerRadius * radius_m;
   const Eigen::Matrix3d R_source_map = T_map_source.rotation.conjugate().toRotationMatrix();
   NormalEquations sum;
-  for (const SourcePoint& point : source) {
+  for (const SurfacePoint& point : source) {
     const Eigen::Vector3d& p_source = point.position;
     const Eigen::Vector3d p_map = T_map_source * p_source;
     const std::optional<SurfacePlane> plane = map.nearest_plane(p_map, radius_m);
@@ -97,26 +99,63 @@ ObservedPart observed_part(const NormalEquations& equations, double length_m, do
   return part;
 }
 
-double rms_range(std::span<const SourcePoint> points) {
+double rms_range(std::span<const SurfacePoint> points) {
   double sum = 0.0;
-  for (const SourcePoint& point : points) sum += point.position.squaredNorm();
+  for (const SurfacePoint& point : points) sum += point.position.squaredNorm();
   return std::max(0.1, std::sqrt(sum / static_cast<double>(points.size())));
 }
 
-std::vector<SourcePoint> source_points(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config,
-                                       const PlaneGates& plane_gates) {
+std::vector<Eigen::Vector3d> finite_points(std::span<const CloudPoint> cloud) {
   std::vector<Eigen::Vector3d> points;
   points.reserve(cloud.size());
   for (const CloudPoint& point : cloud) {
     if (point.position.allFinite()) points.push_back(point.position.cast<double>());
   }
-  PlaneMap surfaces(points, config.map_voxel_m, plane_gates);
-  std::vector<SourcePoint> source;
+  return points;
+}
+
+/// One point per source voxel of `points`, with the direction of its surface in `surfaces`.
+std::vector<SurfacePoint> surface_points(std::span<const Eigen::Vector3d> points, PlaneMap& surfaces,
+                                         const LoopMatcherConfig& config) {
+  std::vector<SurfacePoint> found;
   for (const Eigen::Vector3d& point : one_per_voxel(points, config.source_voxel_m)) {
     const auto plane = surfaces.nearest_plane(point, config.plane_radius_m);
-    source.push_back({point, plane ? std::optional(plane->normal) : std::nullopt});
+    found.push_back({point, plane ? std::optional(plane->normal) : std::nullopt});
   }
-  return source;
+  return found;
+}
+
+/// Of the map's upright surfaces that the source would show, the fraction that it shows; of all surfaces where none is
+/// upright, for a floor lies under any place. Nothing to show counts as nothing shown.
+double overlap(std::span<const Eigen::Vector3d> source, PlaneMap& source_surfaces,
+               std::span<const Eigen::Vector3d> map_points, PlaneMap& map, const Pose& T_map_source,
+               const LoopMatcherConfig& config) {
+  struct Count {
+    int would_show = 0;
+    int shown = 0;
+  };
+  Count all;
+  Count upright;
+  const ViewGrid view(source, config.view_cell_deg * std::numbers::pi / 180.0);
+  const Pose T_source_map = T_map_source.inverse();
+  for (const Eigen::Vector3d& p_map : one_per_voxel(map_points, config.source_voxel_m)) {
+    const Eigen::Vector3d p_source = T_source_map * p_map;
+    if (!view.would_show(p_source, config.last_radius_m)) continue;
+    const auto map_plane = map.nearest_plane(p_map, config.plane_radius_m);
+    if (!map_plane) continue;
+    const SurfacePoint surface{p_source, T_source_map.rotation * map_plane->normal};
+    const auto plane = source_surfaces.nearest_plane(p_source, config.last_radius_m);
+    // Too few points for a plane say neither yes nor no.
+    if (!plane && source_surfaces.has_point_near(p_source, config.last_radius_m)) continue;
+    const bool shown = plane && surface.agrees_with(plane->normal);
+    for (Count* count : {&all, &upright}) {
+      if (count == &upright && !surface.on_wall()) continue;
+      ++count->would_show;
+      if (shown) ++count->shown;
+    }
+  }
+  const Count& counted = upright.would_show > 0 ? upright : all;
+  return counted.would_show > 0 ? static_cast<double>(counted.shown) / counted.would_show : 0.0;
 }
 
 void judge(LoopMatch& match, bool converged, const LoopMatcherConfig& config, const LoopGates& gates) {
@@ -128,6 +167,10 @@ void judge(LoopMatch& match, bool converged, const LoopMatcherConfig& config, co
     match.reason = LoopReason::kTooFewMatched;
     match.reason_text = std::format("{:.0f} % of the upright surfaces found their like, at least {:.0f} % are needed",
                                     100.0 * match.wall_fraction, 100.0 * config.min_wall_fraction);
+  } else if (match.overlap < config.min_overlap) {
+    match.reason = LoopReason::kTooLittleOverlap;
+    match.reason_text = std::format("the cloud shows {:.0f} % of what it would see of the candidate, at least {:.0f} %",
+                                    100.0 * match.overlap, 100.0 * config.min_overlap);
   } else if (match.directions < config.min_directions) {
     match.reason = LoopReason::kDegenerate;
     match.reason_text = std::format("the geometry holds {} of 6 directions, at least {} are needed", match.directions,
@@ -146,8 +189,9 @@ void judge(LoopMatch& match, bool converged, const LoopMatcherConfig& config, co
   } else {
     match.reason = LoopReason::kAccepted;
     match.reason_text =
-        std::format("{:.0f} % matched at {:.3f} m, correction {:.2f} m, {} directions held",
-                    100.0 * match.matched_fraction, match.mean_residual, match.correction_m, match.directions);
+        std::format("{:.0f} % matched at {:.3f} m, overlap {:.0f} %, correction {:.2f} m, {} directions held",
+                    100.0 * match.matched_fraction, match.mean_residual, 100.0 * match.overlap, match.correction_m,
+                    match.directions);
   }
 }
 
@@ -165,7 +209,9 @@ LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::
   LoopMatch match;
   match.T_map_source = T_map_source_predicted;
   const PlaneGates plane_gates{config.plane_radius_m, config.plane_thickness_m, config.plane_min_points};
-  const std::vector<SourcePoint> points = source_points(source, config, plane_gates);
+  const std::vector<Eigen::Vector3d> source_cloud = finite_points(source);
+  PlaneMap source_surfaces(source_cloud, config.map_voxel_m, plane_gates);
+  const std::vector<SurfacePoint> points = surface_points(source_cloud, source_surfaces, config);
   if (points.empty() || map_points.empty()) {
     match.reason_text = points.empty() ? "the keyframe has no points" : "the candidate has no points";
     return match;
@@ -190,9 +236,15 @@ LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::
   const ObservedPart part = observed_part(final_sum, length, config.degenerate_ratio);
   match.directions = part.directions;
   match.matched_fraction = static_cast<double>(final_sum.matched) / static_cast<double>(points.size());
-  const auto walls = std::ranges::count_if(points, &SourcePoint::on_wall);
+  const auto walls = std::ranges::count_if(points, &SurfacePoint::on_wall);
   // Without upright surfaces nothing was asked of them; the count of directions then decides.
   match.wall_fraction = walls > 0 ? static_cast<double>(final_sum.walls_matched) / static_cast<double>(walls) : 1.0;
+  const bool enough_matched =
+      match.matched_fraction >= gates.loop_match_min_frac && match.wall_fraction >= config.min_wall_fraction;
+  // The other way round costs as much again; most candidates have failed by now.
+  if (enough_matched) {
+    match.overlap = overlap(source_cloud, source_surfaces, map_points, map, match.T_map_source, config);
+  }
   if (final_sum.matched > 0) match.mean_residual = final_sum.absolute / final_sum.matched;
   const double floor = config.noise_floor_m * config.noise_floor_m;
   const double variance =

@@ -26,6 +26,8 @@ struct LoopMatcherConfig {
   double degenerate_ratio = 0.01;   ///< a direction below this share of the matched points' weight is left free
   int min_directions = 5;           ///< fewest directions that the geometry must hold: a wall beside the floor
   double min_wall_fraction = 0.5;   ///< upright surfaces that must find their like; a floor fits any other floor
+  double min_overlap = 0.4;         ///< of what the current cloud would show of the local map, how much it must show
+  double view_cell_deg = 3.0;       ///< side of a cell of the grid of directions that decides what would be shown
   double noise_floor_m = 0.01;      ///< smallest point noise that the information may assume
 
   void visit_fields(this auto& self, auto& visit) {
@@ -45,6 +47,10 @@ struct LoopMatcherConfig {
     visit.integer("min_directions", self.min_directions, {1, 6}, "1", "fewest directions that the geometry must hold");
     visit.number("min_wall_fraction", self.min_wall_fraction, {0.0, 1.0}, "1",
                  "fraction of the points on upright surfaces that must find a plane of like direction");
+    visit.number("min_overlap", self.min_overlap, {0.0, 1.0}, "1",
+                 "of the local map that the current cloud would show, the fraction that must lie on its planes");
+    visit.number("view_cell_deg", self.view_cell_deg, {0.5, 30.0}, "deg",
+                 "side of a cell of the grid of directions that tells what the current cloud would show");
     visit.number("noise_floor_m", self.noise_floor_m, {1e-4, 1.0}, "m", "smallest point noise assumed");
   }
   void check(config::Offences& offences, const std::string& path) const;
@@ -59,6 +65,8 @@ struct LoopMatch {
   int directions = 0;                       ///< directions that the geometry holds, 0..6
   double matched_fraction = 0.0;
   double wall_fraction = 0.0;  ///< the same among points on upright surfaces
+  double overlap = 0.0;        ///< of the local map's surfaces that the source would show, those it does show; 0 when
+                               ///< too few points matched to ask
   double mean_residual = 0.0;  ///< [m] mean absolute point-to-plane distance of the matched points
   double correction_m = 0.0;   ///< translation from the prediction to the result
   double correction_rad = 0.0;
@@ -67,13 +75,15 @@ struct LoopMatch {
   [[nodiscard]] bool verified() const { return reason == LoopReason::kAccepted; }
 };
 
-/// A point counts as matched when the nearest map point within the search radius lies on a plane whose direction agrees
-/// with that of the point's own surroundings, where those are planar.
-///
 /// Aligns `source` (body frame of the current keyframe) with the local map `map_points` (any frame) by point-to-plane
 /// Gauss-Newton with a search radius that narrows and Cauchy weights, beginning at `T_map_source` predicted; then
 /// applies the gates. Directions in which the geometry says nothing keep the prediction and get no information (J.
 /// Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state estimation problems", ICRA 2016).
+///
+/// A point counts as matched when the nearest map point within the search radius lies on a plane whose direction agrees
+/// with that of the point's own surroundings, where those are planar. The overlap asks the other way round, so that a
+/// bare corner that fits into any room is not enough: of the map's surfaces that lie in the view of the source and are
+/// not hidden from it, how many lie on planes of the source?
 [[nodiscard]] LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::Vector3d> map_points,
                                    const Pose& T_map_source_predicted, const LoopMatcherConfig& config,
                                    const LoopGates& gates);

@@ -27,6 +27,36 @@ const char* text(LoopReason reason) {
       return "match did not converge";
     case LoopReason::kTooSoon:
       return "too soon after the last loop";
+    case LoopReason::kTooLittleOverlap:
+      return "too little overlap";
+    case LoopReason::kContradictsOdometry:
+      return "contradicts the odometry";
+    case LoopReason::kContradictsLoops:
+      return "contradicts other loops";
+    case LoopReason::kNeedsSupport:
+      return "waits for a second loop that agrees";
+    case LoopReason::kKept:
+      return "kept";
+    case LoopReason::kVetoed:
+      return "vetoed";
+  }
+  return "unknown";
+}
+
+const char* text(LoopStage stage) {
+  switch (stage) {
+    case LoopStage::kNone:
+      return "none";
+    case LoopStage::kCandidate:
+      return "candidate";
+    case LoopStage::kVerified:
+      return "verified";
+    case LoopStage::kOnTrial:
+      return "on trial";
+    case LoopStage::kKept:
+      return "kept";
+    case LoopStage::kWithdrawn:
+      return "withdrawn";
   }
   return "unknown";
 }

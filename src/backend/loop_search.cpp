@@ -2,7 +2,9 @@
 #include "backend/loop_search.h"
 
 #include <algorithm>
-#include <format>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
 
 #include "backend/loop_detector.h"
 #include "backend/loop_matcher.h"
@@ -33,6 +35,7 @@ bool is_better(const LoopMatch& match, const LoopMatch& best) {
 }
 
 void fill(LoopResult& result, const LoopMatch& match, std::int32_t to_id) {
+  result.stage = match.verified() ? LoopStage::kVerified : LoopStage::kCandidate;
   result.reason = match.reason;
   result.reason_text = match.reason_text;
   result.to_id = to_id;
@@ -40,36 +43,87 @@ void fill(LoopResult& result, const LoopMatch& match, std::int32_t to_id) {
   result.correction_rad = match.correction_rad;
   result.mean_residual = match.mean_residual;
   result.matched_fraction = match.matched_fraction;
+  result.overlap = match.overlap;
   result.T_to_from = match.T_map_source;
+}
+
+/// Too few keyframes or too little way since the newest loop.
+bool too_soon(const SmootherState& state, const BackendConfig& config) {
+  const GraphNode* last = state.node_of(state.last_loop_id);
+  if (last == nullptr) return false;
+  const LinkEnd& now = state.nodes.back().end;
+  if (now.id - last->end.id < config.loop_min_spacing) return true;
+  return (now.T_odom_body.translation - last->end.T_odom_body.translation).norm() < config.loop_min_travel_m;
+}
+
+/// Where the chi-square test against the odometry decides, the match itself must not.
+LoopGates match_gates(const LoopGates& gates, const BackendConfig& config) {
+  LoopGates chosen = gates;
+  if (config.loop_correction_gate == "covariance") chosen.loop_max_correction_m = std::numeric_limits<double>::max();
+  return chosen;
+}
+
+/// Residuals of one surface are not independent, and what does not fit is an error of all of them together.
+WhiteningRows loop_noise(const LoopMatch& match, const BackendConfig& config) {
+  const double misfit = config.loop_residual_weight * match.mean_residual / config.loop_floor_m;
+  const double growth = std::sqrt(1.0 + misfit * misfit);
+  return whitening_with_floor(match.information / config.loop_noise_inflation, growth * config.loop_floor_rad,
+                              growth * config.loop_floor_m);
+}
+
+LoopProposal refusal(LoopReason reason) {
+  LoopProposal proposal;
+  proposal.result.reason = reason;
+  proposal.result.reason_text = text(reason);
+  return proposal;
+}
+
+LoopProposal best_match(const std::vector<std::size_t>& chosen, const SmootherState& state, const BackendConfig& config,
+                        const LoopGates& gates) {
+  LoopProposal proposal;
+  const KeyframePose& current = state.poses.back();
+  const auto neighbours = static_cast<std::size_t>(config.matcher.neighbours);
+  LoopMatch best;
+  for (const std::size_t i : chosen) {
+    const Pose T_candidate_current = state.poses[i].T_map_body.inverse() * current.T_map_body;
+    const LoopMatch match = match_loop(state.clouds.back(), local_map(i, neighbours, state.poses, state.clouds),
+                                       T_candidate_current, config.matcher, gates);
+    if (match.verified()) ++proposal.result.passed;
+    if (i != chosen.front() && !is_better(match, best)) continue;
+    best = match;
+    fill(proposal.result, match, state.poses[i].id);
+    proposal.rows = loop_noise(match, config);
+  }
+  proposal.result.from_id = current.id;
+  return proposal;
 }
 
 }  // namespace
 
-LoopProposal search_loop(std::span<const KeyframePose> poses, std::span<const std::vector<CloudPoint>> clouds,
-                         const BackendConfig& config, const LoopGates& gates) {
-  LoopProposal proposal;
-  const KeyframePose& current = poses.back();
-  const std::vector<std::size_t> candidates = loop_candidates(poses, current, gates);
-  proposal.result.candidates = static_cast<int>(candidates.size());
-  if (candidates.empty()) {
-    proposal.result.reason_text = text(LoopReason::kNoCandidate);
-    return proposal;
-  }
-  proposal.result.from_id = current.id;
-  const auto neighbours = static_cast<std::size_t>(config.matcher.neighbours);
-  const std::vector<std::size_t> chosen =
-      choose_candidates(candidates, poses, current, static_cast<std::size_t>(config.loop_max_candidates), neighbours);
-  LoopMatch best;
-  for (const std::size_t i : chosen) {
-    const Pose T_candidate_current = poses[i].T_map_body.inverse() * current.T_map_body;
-    const LoopMatch match =
-        match_loop(clouds.back(), local_map(i, neighbours, poses, clouds), T_candidate_current, config.matcher, gates);
-    if (match.verified()) ++proposal.result.passed;
-    if (i != chosen.front() && !is_better(match, best)) continue;
-    best = match;
-    fill(proposal.result, match, poses[i].id);
-    proposal.information = match.information;
-  }
+bool is_vetoed(std::span<const LoopVeto> vetoes, std::int32_t from_id, std::int32_t to_id, int spacing) {
+  return std::ranges::any_of(vetoes, [&](const LoopVeto& veto) {
+    return std::abs(veto.from_id - from_id) <= spacing && std::abs(veto.to_id - to_id) <= spacing;
+  });
+}
+
+LoopProposal search_loop(const SmootherState& state, const BackendConfig& config, const LoopGates& gates) {
+  if (!config.use_loop_closing) return refusal(LoopReason::kDisabled);
+  if (too_soon(state, config)) return refusal(LoopReason::kTooSoon);
+  std::vector<std::size_t> candidates = loop_candidates({state.poses, state.places, state.odometry}, gates,
+                                                        config.loop_widening_sigmas, config.loop_max_widening_m);
+  const auto found = static_cast<int>(candidates.size());
+  if (candidates.empty()) return refusal(LoopReason::kNoCandidate);
+  const KeyframePose& current = state.poses.back();
+  std::erase_if(candidates, [&](std::size_t i) {
+    return is_vetoed(state.vetoes, current.id, state.poses[i].id, config.loop_min_spacing);
+  });
+  LoopProposal proposal = candidates.empty()
+                              ? refusal(LoopReason::kVetoed)
+                              : best_match(choose_candidates(candidates, state.poses, current,
+                                                             static_cast<std::size_t>(config.loop_max_candidates),
+                                                             static_cast<std::size_t>(config.matcher.neighbours)),
+                                           state, config, match_gates(gates, config));
+  proposal.result.candidates = found;
   return proposal;
 }
 

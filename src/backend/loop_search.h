@@ -2,26 +2,27 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "backend/backend_config.h"
-#include "backend/keyframe_pose.h"
 #include "backend/loop_result.h"
+#include "backend/smoother_state.h"
 #include "common/loop_gates.h"
-#include "common/measurements.h"
 
 namespace ignis {
 
-/// The best match of the newest keyframe with an earlier one.
+/// What the newest keyframe found.
 struct LoopProposal {
-  LoopResult result;                        ///< kAccepted: verified by the match, not yet on trial
-  Matrix6d information = Matrix6d::Zero();  ///< of the match alone; attitude then position, body axes of the newest
+  LoopResult result;         ///< stage kVerified: confirmed by the match, not yet judged by the others
+  WhiteningRows rows{0, 6};  ///< of the relative pose, body axes of the newest
+
+  [[nodiscard]] bool verified() const { return result.stage == LoopStage::kVerified; }
 };
 
-/// Looks for a loop that ends at the newest keyframe, the last of `poses`. `clouds` holds the body cloud of each. Up to
-/// loop_max_candidates are matched; the verified one with the largest matched fraction wins, the older one on a tie.
-[[nodiscard]] LoopProposal search_loop(std::span<const KeyframePose> poses,
-                                       std::span<const std::vector<CloudPoint>> clouds, const BackendConfig& config,
-                                       const LoopGates& gates);
+/// The pair, or one whose ends both lie within `spacing` keyframes of it, was vetoed.
+[[nodiscard]] bool is_vetoed(std::span<const LoopVeto> vetoes, std::int32_t from_id, std::int32_t to_id, int spacing);
+
+/// Looks for a loop that ends at the newest keyframe, unless one was closed only just. Up to loop_max_candidates are
+/// matched; the verified one with the largest matched fraction wins, the older one on a tie. Requires follow_nodes().
+[[nodiscard]] LoopProposal search_loop(const SmootherState& state, const BackendConfig& config, const LoopGates& gates);
 
 }  // namespace ignis

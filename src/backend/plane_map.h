@@ -34,6 +34,11 @@ class PlaneMap {
   /// The plane at the map point nearest to `point`, if there is one within `radius_m` and its surroundings are planar.
   [[nodiscard]] std::optional<SurfacePlane> nearest_plane(const Eigen::Vector3d& point, double radius_m);
 
+  /// There is a map point within `radius_m`, on a plane or not.
+  [[nodiscard]] bool has_point_near(const Eigen::Vector3d& point, double radius_m) const {
+    return nearest_point(point, radius_m).has_value();
+  }
+
   [[nodiscard]] std::size_t size() const { return points_.size(); }
 
  private:

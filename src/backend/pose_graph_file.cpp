@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backend/pose_graph_file.h"
 
+#include <Eigen/Eigenvalues>
+#include <array>
 #include <cmath>
 #include <format>
 #include <fstream>
-#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <unordered_set>
 
 #include "common/file_output.h"
 
@@ -15,6 +17,11 @@ namespace ignis {
 namespace {
 
 constexpr const char* kLoopMark = "# loop";
+constexpr const char* kVertex = "VERTEX_SE3:QUAT";
+constexpr const char* kEdge = "EDGE_SE3:QUAT";
+constexpr const char* kPlanarVertex = "VERTEX_SE2";
+constexpr const char* kPlanarEdge = "EDGE_SE2";
+constexpr double kRounding = 1e-6;  // of published files, relative to the largest eigenvalue
 
 /// Swaps the attitude and the position half of a symmetric matrix.
 Matrix6d swapped_halves(const Matrix6d& m) {
@@ -29,15 +36,31 @@ void write_pose(std::ostream& out, const Pose& pose) {
   out << std::format(" {} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
 }
 
-void write_edge(std::ostream& out, const PoseGraphEdge& edge) {
-  if (edge.is_loop) out << kLoopMark << '\n';
-  out << std::format("EDGE_SE3:QUAT {} {}", edge.from, edge.to);
-  write_pose(out, edge.T_from_to);
-  const Matrix6d information = swapped_halves(edge.information);
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) out << std::format(" {}", information(row, column));
+double heading_of(const Pose& pose) { return 2.0 * std::atan2(pose.rotation.z(), pose.rotation.w()); }
+
+void write_planar_pose(std::ostream& out, const Pose& pose) {
+  out << std::format(" {} {} {}", pose.translation.x(), pose.translation.y(), heading_of(pose));
+}
+
+template <int kSize>
+void write_upper_triangle(std::ostream& out, const Eigen::Matrix<double, kSize, kSize>& information) {
+  for (int row = 0; row < kSize; ++row) {
+    for (int column = row; column < kSize; ++column) out << std::format(" {}", information(row, column));
   }
   out << '\n';
+}
+
+void write_edge(std::ostream& out, const PoseGraphEdge& edge, bool planar) {
+  if (edge.is_loop) out << kLoopMark << '\n';
+  out << std::format("{} {} {}", planar ? kPlanarEdge : kEdge, edge.from, edge.to);
+  if (planar) {
+    write_planar_pose(out, edge.T_from_to);
+    const std::array<int, 3> x_y_heading{3, 4, 2};
+    write_upper_triangle<3>(out, edge.information(x_y_heading, x_y_heading));
+  } else {
+    write_pose(out, edge.T_from_to);
+    write_upper_triangle<6>(out, swapped_halves(edge.information));
+  }
 }
 
 /// Reads the numbers of one record; every complaint names file and line.
@@ -72,30 +95,108 @@ class RecordReader {
     if (std::abs(norm - 1.0) > 1e-15) pose.rotation.normalize();
     return pose;
   }
-  Matrix6d information() {
-    Matrix6d m;
-    for (int row = 0; row < 6; ++row) {
-      for (int column = row; column < 6; ++column) m(row, column) = m(column, row) = number();
-    }
-    return swapped_halves(m);
+  Pose planar_pose() {
+    Pose pose;
+    for (int i = 0; i < 2; ++i) pose.translation(i) = number();
+    pose.rotation = Eigen::AngleAxisd(number(), Eigen::Vector3d::UnitZ());
+    return pose;
+  }
+  Matrix6d information() { return swapped_halves(upper_triangle<6>()); }
+  Matrix6d planar_information() {
+    const Eigen::Matrix3d known = upper_triangle<3>();
+    Matrix6d information = known.diagonal().maxCoeff() * Matrix6d::Identity();
+    const std::array<int, 3> x_y_heading{3, 4, 2};
+    information(x_y_heading, x_y_heading) = known;
+    return information;
+  }
+  void end() {
+    if (!word().empty()) fail("the record is too long");
   }
   [[noreturn]] void fail(const std::string& reason) const { throw std::runtime_error(where_ + ": " + reason); }
 
  private:
+  template <int kSize>
+  Eigen::Matrix<double, kSize, kSize> upper_triangle() {
+    Eigen::Matrix<double, kSize, kSize> m;
+    for (int row = 0; row < kSize; ++row) {
+      for (int column = row; column < kSize; ++column) m(row, column) = m(column, row) = number();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kSize, kSize>> eigen(m, Eigen::EigenvaluesOnly);
+    const auto& eigenvalues = eigen.eigenvalues();  // ascending
+    if (eigenvalues(0) < -kRounding * eigenvalues(kSize - 1)) fail("the information has a negative direction");
+    return m;
+  }
+
   std::istringstream stream_;
   std::string where_;
 };
 
-PoseGraphEdge read_edge(RecordReader& reader, const std::set<std::int32_t>& known, bool is_loop) {
+PoseGraphEdge read_edge(RecordReader& reader, bool planar, bool is_loop) {
   PoseGraphEdge edge;
   edge.from = reader.integer();
   edge.to = reader.integer();
-  if (!known.contains(edge.from) || !known.contains(edge.to)) reader.fail("the edge names an unknown vertex");
-  edge.T_from_to = reader.pose();
-  edge.information = reader.information();
+  if (edge.from == edge.to) reader.fail(std::format("the edge joins vertex {} to itself", edge.to));
+  edge.T_from_to = planar ? reader.planar_pose() : reader.pose();
+  edge.information = planar ? reader.planar_information() : reader.information();
   edge.is_loop = is_loop;
   return edge;
 }
+
+/// Reads record after record into a graph.
+class GraphReader {
+ public:
+  explicit GraphReader(std::string file) : file_(std::move(file)) {}
+
+  void read(const std::string& line) {
+    ++line_;
+    RecordReader reader(line, where(line_));
+    const std::string tag = reader.word();
+    if (tag == kVertex || tag == kPlanarVertex) {
+      note_kind(tag == kPlanarVertex, reader);
+      read_vertex(reader);
+    } else if (tag == kEdge || tag == kPlanarEdge) {
+      note_kind(tag == kPlanarEdge, reader);
+      graph_.edges.push_back(read_edge(reader, graph_.planar, loop_follows_));
+      edge_lines_.push_back(line_);
+    } else if (!tag.empty() && tag[0] != '#' && tag != "FIX") {
+      reader.fail("unknown record \"" + tag + '"');
+    }
+    if (tag.contains("_SE")) reader.end();
+    loop_follows_ = line.starts_with(kLoopMark);
+  }
+
+  PoseGraph finish() {
+    for (std::size_t i = 0; i < graph_.edges.size(); ++i) {
+      for (const std::int32_t id : {graph_.edges[i].from, graph_.edges[i].to}) {
+        if (known_.contains(id)) continue;
+        throw std::runtime_error(std::format("{}: the edge names an unknown vertex, {}", where(edge_lines_[i]), id));
+      }
+    }
+    return std::move(graph_);
+  }
+
+ private:
+  [[nodiscard]] std::string where(int line) const { return std::format("{}:{}", file_, line); }
+
+  void note_kind(bool planar, const RecordReader& reader) {
+    const bool is_first = graph_.vertices.empty() && graph_.edges.empty();
+    if (!is_first && planar != graph_.planar) reader.fail("SE2 and SE3 records are mixed");
+    graph_.planar = planar;
+  }
+
+  void read_vertex(RecordReader& reader) {
+    const std::int32_t id = reader.integer();
+    if (!known_.insert(id).second) reader.fail(std::format("vertex {} is there twice", id));
+    graph_.vertices.push_back({id, graph_.planar ? reader.planar_pose() : reader.pose()});
+  }
+
+  std::string file_;
+  PoseGraph graph_;
+  std::unordered_set<std::int32_t> known_;
+  std::vector<int> edge_lines_;
+  int line_ = 0;
+  bool loop_follows_ = false;
+};
 
 }  // namespace
 
@@ -103,37 +204,22 @@ void write_pose_graph(const std::filesystem::path& file, const PoseGraph& graph)
   FileOutput output(file);
   std::ostream& out = output.stream();
   for (const KeyframePose& vertex : graph.vertices) {
-    out << std::format("VERTEX_SE3:QUAT {}", vertex.id);
-    write_pose(out, vertex.T_map_body);
+    out << std::format("{} {}", graph.planar ? kPlanarVertex : kVertex, vertex.id);
+    graph.planar ? write_planar_pose(out, vertex.T_map_body) : write_pose(out, vertex.T_map_body);
     out << '\n';
   }
   if (!graph.vertices.empty()) out << std::format("FIX {}\n", graph.vertices.front().id);
-  for (const PoseGraphEdge& edge : graph.edges) write_edge(out, edge);
+  for (const PoseGraphEdge& edge : graph.edges) write_edge(out, edge, graph.planar);
   output.commit();
 }
 
 PoseGraph read_pose_graph(const std::filesystem::path& file) {
   std::ifstream in(file);
   if (!in) throw std::runtime_error(std::format("{}: cannot be opened for reading", file.string()));
-  PoseGraph graph;
-  std::set<std::int32_t> known;
+  GraphReader reader(file.string());
   std::string line;
-  bool loop_follows = false;
-  for (int number = 1; std::getline(in, line); ++number) {
-    RecordReader reader(line, std::format("{}:{}", file.string(), number));
-    const std::string tag = reader.word();
-    if (tag == "VERTEX_SE3:QUAT") {
-      const std::int32_t id = reader.integer();
-      if (!known.insert(id).second) reader.fail(std::format("vertex {} is there twice", id));
-      graph.vertices.push_back({id, reader.pose()});
-    } else if (tag == "EDGE_SE3:QUAT") {
-      graph.edges.push_back(read_edge(reader, known, loop_follows));
-    } else if (!tag.empty() && tag[0] != '#' && tag != "FIX") {
-      reader.fail("unknown record \"" + tag + '"');
-    }
-    loop_follows = line.starts_with(kLoopMark);
-  }
-  return graph;
+  while (std::getline(in, line)) reader.read(line);
+  return reader.finish();
 }
 
 }  // namespace ignis

@@ -23,15 +23,19 @@ struct PoseGraphEdge {
 struct PoseGraph {
   std::vector<KeyframePose> vertices;
   std::vector<PoseGraphEdge> edges;
+  bool planar = false;  ///< all of it lies in the plane z = 0, rotations about z: read from SE2 records
 };
 
 /// Writes g2o text: VERTEX_SE3:QUAT, FIX for the first vertex, EDGE_SE3:QUAT with translation first in the information.
-/// A loop is marked by a comment line "# loop" before its edge. Numbers read back bit for bit. Appears under its name
-/// only when complete; throws std::runtime_error naming the path.
+/// A planar graph leaves as VERTEX_SE2 and EDGE_SE2. A loop is marked by a comment line "# loop" before its edge.
+/// Numbers of SE3 records read back bit for bit. Appears under its name only when complete; throws std::runtime_error
+/// naming the path.
 void write_pose_graph(const std::filesystem::path& file, const PoseGraph& graph);
 
-/// Reads what write_pose_graph writes and the published graphs of that format. Throws std::runtime_error naming file,
-/// line and reason: unknown record, missing or non-finite number, zero quaternion, edge to an unknown vertex.
+/// Reads what write_pose_graph writes and the published graphs of that format, vertices and edges in any order. In a
+/// planar graph the three directions that SE2 does not know are held as tightly as the tightest that it knows. Throws
+/// std::runtime_error naming file, line and reason: unknown record, SE2 mixed with SE3, missing or non-finite number, a
+/// number too many, zero quaternion, information with a negative direction, edge to an unknown vertex or to itself.
 [[nodiscard]] PoseGraph read_pose_graph(const std::filesystem::path& file);
 
 }  // namespace ignis

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <functional>
+#include <unordered_map>
 #include <vector>
 
 #include "backend/incremental_solver.h"
@@ -13,10 +16,51 @@ struct PoseGraphSolution {
   double half_chi_square = 0.0;     ///< of the edges alone
 };
 
-/// Solves a graph of relative poses incrementally, as the back end does on the vehicle: each pose enters with all its
-/// edges to earlier poses, first guessed through the edge from its predecessor; the stored vertex poses are not used
-/// except for the first, which is held. Throws std::runtime_error when a pose has no edge to an earlier one or the
-/// solver refuses an edge.
+/// Solves a graph of relative poses incrementally, as the back end does on the vehicle: a pose enters when an edge
+/// connects it to those that are in (of several, the one that comes first in the file), with all its edges to them,
+/// first guessed through the edge to the most recent one. The stored vertex poses are not used except for the first,
+/// which is held. One thread; whoever calls measures the time.
+class PoseGraphOptimiser {
+ public:
+  /// Keeps a reference to `graph`. Throws std::runtime_error naming the vertices that no chain of edges joins to the
+  /// first one, and config::ConfigError naming every offence of `config`.
+  PoseGraphOptimiser(const PoseGraph& graph, const SolverConfig& config);
+
+  [[nodiscard]] std::size_t entered() const { return entered_; }
+  [[nodiscard]] bool complete() const { return entered_ == order_.size(); }
+
+  /// One update of the solver. Requires !complete(). Throws std::runtime_error when the solver refuses the pose.
+  void add_next();
+
+  /// Settles the whole graph. Requires complete().
+  [[nodiscard]] PoseGraphSolution finish();
+
+ private:
+  /// A vertex and its edges to those that enter before it.
+  struct Entry {
+    std::size_t vertex = 0;
+    std::vector<const PoseGraphEdge*> edges;
+  };
+
+  [[nodiscard]] static std::vector<Entry> entry_order(const PoseGraph& graph);
+
+  const PoseGraph& graph_;
+  int relinearize_skip_;
+  std::vector<Entry> order_;
+  std::unordered_map<std::int32_t, std::size_t> place_in_entry_;  ///< of the ids that are in: how many came before
+  IncrementalSolver solver_;
+  std::size_t entered_ = 0;
+  FactorId hold_ = 0;
+};
+
+/// All steps of PoseGraphOptimiser at once.
 [[nodiscard]] PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config);
+
+/// Told after each iteration of a batch solve; false ends it there.
+using BatchObserver = std::function<bool(std::size_t iteration, double half_chi_square)>;
+
+/// Levenberg-Marquardt over the whole graph, from the stored vertex poses; the first vertex is held. What a wrong
+/// minimum near those poses holds it keeps. Throws std::runtime_error when the solver does.
+[[nodiscard]] PoseGraphSolution optimise_in_batch(const PoseGraph& graph, const BatchObserver& observer);
 
 }  // namespace ignis

@@ -33,6 +33,18 @@ bool is_sane(const ImuSample& sample) {
          sample.accel.norm() < kAbsurdAcceleration;
 }
 
+/// GTSAM's increment keeps its members to itself and its heirs.
+class RestoredIncrement : public gtsam::TangentPreintegration {
+ public:
+  RestoredIncrement(const ImuSum& plain, const ImuNoise& noise)
+      : TangentPreintegration(parameters(noise), gtsam::imuBias::ConstantBias(plain.accel_bias, plain.gyro_bias)) {
+    deltaTij_ = plain.duration_s;
+    preintegrated_ = plain.increment;
+    preintegrated_H_biasAcc_ = plain.by_accel_bias;
+    preintegrated_H_biasOmega_ = plain.by_gyro_bias;
+  }
+};
+
 }  // namespace
 
 std::optional<std::string> imu_problem(std::span<const ImuSample> samples, Utime start, Utime end,
@@ -69,6 +81,20 @@ gtsam::PreintegratedCombinedMeasurements preintegrate(std::span<const ImuSample>
     sum.integrateMeasurement(samples[i].accel, samples[i].gyro, seconds_between(from, to));
   }
   return sum;
+}
+
+ImuSum plain_sum(const gtsam::PreintegratedCombinedMeasurements& sum) {
+  return {.duration_s = sum.deltaTij(),
+          .gyro_bias = sum.biasHat().gyroscope(),
+          .accel_bias = sum.biasHat().accelerometer(),
+          .increment = sum.preintegrated(),
+          .by_accel_bias = sum.preintegrated_H_biasAcc(),
+          .by_gyro_bias = sum.preintegrated_H_biasOmega(),
+          .covariance = sum.preintMeasCov()};
+}
+
+gtsam::PreintegratedCombinedMeasurements sum_of(const ImuSum& plain, const ImuNoise& noise) {
+  return {RestoredIncrement(plain, noise), plain.covariance};
 }
 
 ImuPrediction predict_from_imu(const NavState& from, std::span<const ImuSample> samples, Utime end,

@@ -55,6 +55,24 @@ struct ImuNoise {
                                                                     Utime end, const NavState& start_state,
                                                                     const ImuNoise& noise);
 
+/// What preintegration leaves of the samples, as plain numbers: enough to make the factor again.
+struct ImuSum {
+  double duration_s = 0.0;
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< [rad/s] that the sum assumes
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  /// Rotation vector, position and velocity increments, axes of the start.
+  Eigen::Vector<double, 9> increment = Eigen::Vector<double, 9>::Zero();
+  Eigen::Matrix<double, 9, 3> by_accel_bias = Eigen::Matrix<double, 9, 3>::Zero();  ///< derivatives of the increment
+  Eigen::Matrix<double, 9, 3> by_gyro_bias = Eigen::Matrix<double, 9, 3>::Zero();
+  /// Attitude, position, velocity, accelerometer bias, gyro bias.
+  Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Zero();
+};
+
+[[nodiscard]] ImuSum plain_sum(const gtsam::PreintegratedCombinedMeasurements& sum);
+
+/// Equal to the sum of which `plain` was made, given the same `noise`.
+[[nodiscard]] gtsam::PreintegratedCombinedMeasurements sum_of(const ImuSum& plain, const ImuNoise& noise);
+
 /// Where the IMU alone says that the vehicle is at `end`.
 struct ImuPrediction {
   NavState state;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,7 @@
 #include "backend/keyframe_pose.h"
 #include "backend/loop_result.h"
 #include "backend/pose_graph_file.h"
+#include "backend/shadow_optimum.h"
 #include "common/keyframe.h"
 #include "common/loop_gates.h"
 
@@ -35,9 +38,10 @@ struct SmootherUpdate {
   Pose T_map_odom;
   Matrix6d covariance = Matrix6d::Zero();  ///< of the newest pose in map; attitude then position, body axes
   bool covariance_valid = false;
-  NavState newest;                    ///< state of the newest keyframe in map (fields named odom are map here)
-  std::optional<LoopResult> loop;     ///< of this keyframe
-  std::vector<LoopResult> withdrawn;  ///< earlier loops that the graph contradicts by now
+  NavState newest;                 ///< state of the newest keyframe in map (fields named odom are map here)
+  std::optional<LoopResult> loop;  ///< of this keyframe
+  std::vector<LoopResult>
+      changed;  ///< other loops that entered or left the graph, were kept or wait for another reason
 
   [[nodiscard]] bool accepted() const { return verdict == KeyframeVerdict::kAccepted; }
 };
@@ -45,13 +49,19 @@ struct SmootherUpdate {
 /// Counters since construction.
 struct SmootherStats {
   int keyframes = 0;
-  int loops_kept = 0;
-  int loops_withdrawn = 0;
+  int loops_kept = 0;       ///< in the graph, on trial or kept
+  int loops_on_trial = 0;   ///< of these, on trial
+  int loops_waiting = 0;    ///< verified, but outside of the graph
+  int loops_withdrawn = 0;  ///< times that a loop left the graph
   int duplicates = 0;
   int gaps = 0;
   int invalid = 0;
   int without_imu = 0;  ///< keyframes linked without preintegration
   int solver_rebuilds = 0;
+  int shadow_checks = 0;        ///< batch solutions that were compared with the incremental one
+  int shadow_swaps = 0;         ///< of these, so far away that they took its place
+  double shadow_gap_m = 0.0;    ///< largest distance of a keyframe from its place in the newest batch solution
+  double shadow_gap_rad = 0.0;  ///< the same for attitudes
 };
 
 /// A loop that was found elsewhere.
@@ -62,13 +72,15 @@ struct LoopMeasurement {
   Matrix6d information = Matrix6d::Zero();  ///< attitude then position, body axes of `from`; taken as it is
 };
 
+struct SmootherRestoration;
+
 /// Fixed-history smoother over keyframes: pose, velocity and biases of each, linked by preintegrated IMU, by what scan
 /// matching alone says of the relative motion, by zero velocity at rest, and by loops. Frame map equals frame odom at
 /// the first keyframe and drifts away from it as odometry does. World +Y up.
 ///
-/// A new loop is on trial: if it raises the chi-square of the graph beyond the configured quantile it is taken out
-/// before anyone sees its effect; if later evidence contradicts it, it is taken out then. Deterministic, no clock; one
-/// thread.
+/// A loop enters when it agrees with odometry and belongs to the largest set of loops that agree with each other. It is
+/// on trial at first, then kept; whichever loop the evidence contradicts is taken out again, however old it is.
+/// Deterministic, no clock; one thread.
 class Smoother {
  public:
   /// Throws config::ConfigError naming every offence.
@@ -80,12 +92,29 @@ class Smoother {
   /// Keyframes enter in the order of their ids, beginning at 0.
   [[nodiscard]] SmootherUpdate add_keyframe(const Keyframe& keyframe);
 
+  /// Whether the keyframe belongs to another drive although session and id fit: the front end was started anew and
+  /// counts from 0 again.
+  [[nodiscard]] bool is_of_another_drive(const Keyframe& keyframe) const;
+
   /// Stops waiting for ids before `id`, which nobody can send any more. The next keyframe is linked across the hole by
   /// loose odometry.
   void accept_gap_before(std::int32_t id);
 
   /// Puts a loop on trial as if it had been found here. `loop` tells the outcome.
   [[nodiscard]] SmootherUpdate add_loop(const LoopMeasurement& measurement);
+
+  /// Takes every loop between the two keyframes out, wherever it stands. The search may find it again.
+  [[nodiscard]] SmootherUpdate withdraw_loop(std::int32_t from_id, std::int32_t to_id);
+
+  /// The same, and neither the pair nor its neighbours within loop_min_spacing are ever closed again.
+  [[nodiscard]] SmootherUpdate veto_loop(std::int32_t from_id, std::int32_t to_id);
+
+  /// The graph as it is now, for solve() on any thread.
+  [[nodiscard]] ShadowProblem shadow_problem();
+
+  /// Notes how far the incremental solution was from the batch optimum, and goes on from there when it was farther than
+  /// configured. Keyframes and loops may have come since; an optimum of another graph is ignored.
+  [[nodiscard]] SmootherUpdate adopt(const ShadowOptimum& optimum);
 
   /// All keyframes as the graph places them, ascending ids.
   [[nodiscard]] const std::vector<KeyframePose>& all_poses() const;
@@ -97,9 +126,27 @@ class Smoother {
   /// Poses, odometry and loops for keyframes.g2o.
   [[nodiscard]] PoseGraph pose_graph() const;
 
+  /// What changed since the previous call, as a record for the journal.
+  [[nodiscard]] std::vector<std::byte> take_change();
+
  private:
-  class Impl;
+  friend SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGates& gates,
+                                              std::span<const std::span<const std::byte>> records);
+
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// A smoother out of a journal.
+struct SmootherRestoration {
+  Smoother smoother;
+  std::size_t records_used = 0;  ///< those behind it do not fit, and are lost
+  std::string problem;           ///< with the first that does not; or why the solver refuses them all
+};
+
+/// The smoother that take_change() wrote these records of, in order, under the same configuration: same keyframes,
+/// loops, revision and estimates. Throws config::ConfigError naming every offence.
+[[nodiscard]] SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGates& gates,
+                                                   std::span<const std::span<const std::byte>> records);
 
 }  // namespace ignis

@@ -54,8 +54,8 @@ struct FrontendConfig {
   double velocity_known_sigma = 0.5;
   double full_observability = 1e-4;
   bool adapt_measurement_noise = true;
-  double noise_prior_points = 5.0;
-  double residual_inflation = 1.0;
+  double noise_prior_points = 20.0;
+  double residual_inflation = 4.0;
   double blind_residual_inflation = 4.0;
   double degeneracy_threshold = 1e-5;
   double degeneracy_signal_to_noise = 1.6;

@@ -88,6 +88,7 @@ loop_result_t to_message(const LoopResult& result, std::int32_t session) {
   message.passed = result.passed;
   message.accepted = result.accepted() ? 1 : 0;
   message.reason = static_cast<std::int8_t>(result.reason);
+  message.stage = static_cast<std::int8_t>(result.stage);
   message.reason_text = result.reason_text.empty() ? text(result.reason) : result.reason_text;
   message.from_id = result.from_id;
   message.to_id = result.to_id;
@@ -95,6 +96,9 @@ loop_result_t to_message(const LoopResult& result, std::int32_t session) {
   message.correction_rad = result.correction_rad;
   message.mean_residual = result.mean_residual;
   message.matched_fraction = result.matched_fraction;
+  message.overlap = result.overlap;
+  message.chi_square = result.chi_square;
+  message.chi_square_bound = result.chi_square_bound;
   store(result.T_to_from.translation, message.relative_position);
   store(result.T_to_from.rotation, message.relative_quaternion);
   return message;

@@ -7,6 +7,7 @@
 
 #include "ignis/cloud_t.hpp"
 #include "ignis/driver_status_t.hpp"
+#include "ignis/graph_command_t.hpp"
 #include "ignis/health_t.hpp"
 #include "ignis/imu_t.hpp"
 #include "ignis/keyframe_request_t.hpp"
@@ -61,9 +62,10 @@ inline constexpr LayoutStep kKeyframe[] = {{kFixed, 8 + 3 * 4 + 2 + 2 + 8 + 2 + 
                                            {kFixed, 4},
                                            {kArray, 3 * 2 + 1}};
 inline constexpr LayoutStep kKeyframeRequest[] = {{kFixed, 8 + 4 + 4}, {kString}, {kCount}, {kArray, 4}};
+inline constexpr LayoutStep kGraphCommand[] = {{kFixed, 8 + 4 + 4 + 1}, {kString}, {kFixed, 4 + 4}};
 inline constexpr LayoutStep kSmoothedKeyframes[] = {
     {kFixed, 8 + 3 * 4 + 2 + 2 + 1 + 2 * 4 + (3 + 4 + 36) * 8}, {kCount}, {kArray, 4 + 7 * 8}};
-inline constexpr LayoutStep kLoopResult[] = {{kFixed, 8 + 5 * 4 + 2}, {kString}, {kFixed, 2 * 4 + 4 * 8 + 7 * 8}};
+inline constexpr LayoutStep kLoopResult[] = {{kFixed, 8 + 5 * 4 + 3}, {kString}, {kFixed, 2 * 4 + 7 * 8 + 7 * 8}};
 inline constexpr LayoutStep kMapStatus[] = {{kFixed, 8 + 5 * 4 + 8 + 2 * 4 + 8 + 8 + 4 + 8 + 8}, {kString}};
 inline constexpr LayoutStep kPose[] = {{kFixed, 8 + 4 + 10 * 8}};
 inline constexpr LayoutStep kHealth[] = {{kFixed, 8 + 4}, {kString},  {kFixed, 4 + 1}, {kString},
@@ -87,6 +89,8 @@ template <>
 inline constexpr std::span<const LayoutStep> kLayout<keyframe_t> = layouts::kKeyframe;
 template <>
 inline constexpr std::span<const LayoutStep> kLayout<keyframe_request_t> = layouts::kKeyframeRequest;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<graph_command_t> = layouts::kGraphCommand;
 template <>
 inline constexpr std::span<const LayoutStep> kLayout<smoothed_keyframes_t> = layouts::kSmoothedKeyframes;
 template <>

@@ -40,11 +40,55 @@ TEST(LoopDetector, GatesTheIndexGap) {
   EXPECT_FALSE(is_loop_candidate(at(50, 0, 0, 0), at(50, 0, 0, 0), gates));
 }
 
+/// Keyframes with the index and the odometry that the search needs; odometry equals the poses.
+struct Space {
+  explicit Space(std::vector<KeyframePose> keyframes, const Matrix6d& step_covariance = Matrix6d::Zero())
+      : poses(std::move(keyframes)) {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      places.place(i, poses[i].T_map_body.translation);
+      odometry.append(poses[i].T_map_body, step_covariance);
+    }
+  }
+  [[nodiscard]] std::vector<std::size_t> candidates(double sigmas, double most_m) const {
+    return loop_candidates({poses, places, odometry}, LoopGates(), sigmas, most_m);
+  }
+
+  std::vector<KeyframePose> poses;
+  PlaceIndex places{8.0};
+  OdometryChain odometry;
+};
+
 TEST(LoopDetector, ListsTheOldestFirst) {
   std::vector<KeyframePose> poses;
   for (int i = 0; i < 30; ++i) poses.push_back(at(i, i % 2 == 0 ? 1.0 : 100.0, 0, 0));
-  const auto found = loop_candidates(poses, at(30, 0, 0, 0), LoopGates());
-  EXPECT_EQ(found, (std::vector<std::size_t>{0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20}));
+  poses.push_back(at(30, 0, 0, 0));
+  EXPECT_EQ(Space(poses).candidates(3.0, 8.0), (std::vector<std::size_t>{0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20}));
+}
+
+TEST(LoopDetector, ReachesFartherWhereOdometryKnowsLess) {
+  std::vector<KeyframePose> poses;
+  for (int i = 0; i < 20; ++i) poses.push_back(at(i, i == 0 ? 10.0 : 60.0, 0, 0));
+  poses.push_back(at(20, 0, 0, 0));
+  Matrix6d drift = Matrix6d::Zero();
+  drift(3, 3) = drift(5, 5) = 0.5 * 0.15 * 0.15;  // horizontally 0.15 m a step, 0.67 m over 20 steps
+  EXPECT_TRUE(Space(poses).candidates(3.0, 8.0).empty());
+  EXPECT_EQ(Space(poses, drift).candidates(3.0, 8.0), (std::vector<std::size_t>{0}));
+  EXPECT_TRUE(Space(poses, drift).candidates(2.9, 8.0).empty());
+  EXPECT_TRUE(Space(poses, drift).candidates(3.0, 1.9).empty()) << "at most so much";
+  drift.setZero();
+  drift(4, 4) = 1.0;
+  EXPECT_TRUE(Space(poses, drift).candidates(3.0, 8.0).empty()) << "height does not count";
+}
+
+TEST(LoopDetector, TurnsFartherWhereOdometryKnowsLess) {
+  std::vector<KeyframePose> poses;
+  for (int i = 0; i < 20; ++i) poses.push_back(at(i, i == 0 ? 1.0 : 60.0, 0, 0));
+  poses.push_back(at(20, 0, 0, 0, std::numbers::pi / 2.0 + 0.2));
+  Matrix6d drift = Matrix6d::Zero();
+  EXPECT_TRUE(Space(poses, drift).candidates(3.0, 0.0).empty());
+  drift(1, 1) = 0.07 * 0.07 / 20.0;
+  EXPECT_EQ(Space(poses, drift).candidates(3.0, 0.0), (std::vector<std::size_t>{0}));
+  EXPECT_TRUE(Space(poses, drift).candidates(2.8, 0.0).empty());
 }
 
 TEST(LoopDetector, ChoosesTheOldestThenTheNearestThatStandApart) {

@@ -100,6 +100,9 @@ TEST(LoopMatcher, AppliesEachGate) {
   LoopMatcherConfig walls;
   walls.min_wall_fraction = 1.0;
   EXPECT_EQ(reason_with(walls, {}), LoopReason::kTooFewMatched);
+  LoopMatcherConfig overlap;
+  overlap.min_overlap = 1.0;
+  EXPECT_EQ(reason_with(overlap, {}), LoopReason::kTooLittleOverlap);
   gates = {};
   gates.loop_max_mean_innovation = 0.004;
   EXPECT_EQ(reason_with({}, gates), LoopReason::kResidualTooLarge);
@@ -112,6 +115,66 @@ TEST(LoopMatcher, AppliesEachGate) {
   gates = {};
   gates.loop_max_mean_innovation = 1.0;
   EXPECT_EQ(reason_with(config, gates), LoopReason::kDidNotConverge);
+}
+
+/// Points on a rectangle, in rows 12 cm apart.
+void add_wall(std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& corner, const Eigen::Vector3d& along,
+              const Eigen::Vector3d& up) {
+  constexpr double kStep = 0.12;
+  for (double u = 0.0; u < along.norm(); u += kStep) {
+    for (double v = 0.0; v < up.norm(); v += kStep)
+      points.push_back(corner + u * along.normalized() + v * up.normalized());
+  }
+}
+
+/// A room with a floor and four walls, and in the body's view a partition wall or not.
+std::vector<Eigen::Vector3d> room(bool partition) {
+  std::vector<Eigen::Vector3d> points;
+  const Eigen::Vector3d up(0.0, 2.5, 0.0);
+  add_wall(points, {-5.0, -0.5, -6.0}, {10.0, 0.0, 0.0}, {0.0, 0.0, 12.0});
+  add_wall(points, {-5.0, -0.5, -6.0}, {10.0, 0.0, 0.0}, up);
+  add_wall(points, {-5.0, -0.5, 6.0}, {10.0, 0.0, 0.0}, up);
+  add_wall(points, {-5.0, -0.5, -6.0}, {0.0, 0.0, 12.0}, up);
+  add_wall(points, {5.0, -0.5, -6.0}, {0.0, 0.0, 12.0}, up);
+  if (partition) {
+    add_wall(points, {-4.0, -0.5, -2.5}, {8.0, 0.0, 0.0}, up);
+    add_wall(points, {-4.0, -0.5, 2.5}, {8.0, 0.0, 0.0}, up);
+    add_wall(points, {-3.0, -0.5, -2.0}, {0.0, 0.0, 4.0}, up);
+    add_wall(points, {3.0, -0.5, -2.0}, {0.0, 0.0, 4.0}, up);
+  }
+  return points;
+}
+
+std::vector<CloudPoint> cloud_of(const std::vector<Eigen::Vector3d>& points) {
+  std::vector<CloudPoint> cloud;
+  for (const Eigen::Vector3d& point : points) cloud.push_back({point.cast<float>(), 0.0F});
+  return cloud;
+}
+
+TEST(LoopMatcher, SeesThatTheCandidateHasWallsWhichAreNotHere) {
+  // An empty room fits wholly into a room of the same size with partitions; only the other way round they differ.
+  const std::vector<CloudPoint> empty = cloud_of(room(false));
+  const LoopMatch same = match_loop(empty, room(false), Pose(), LoopMatcherConfig(), LoopGates());
+  EXPECT_TRUE(same.verified()) << same.reason_text;
+  EXPECT_GT(same.overlap, 0.95);
+  const LoopMatch other = match_loop(empty, room(true), Pose(), LoopMatcherConfig(), LoopGates());
+  EXPECT_GT(other.matched_fraction, 0.7);
+  EXPECT_GT(other.wall_fraction, 0.7);
+  EXPECT_LT(other.overlap, 0.8);
+  LoopMatcherConfig strict;
+  strict.min_overlap = 0.85;
+  EXPECT_EQ(match_loop(empty, room(true), Pose(), strict, LoopGates()).reason, LoopReason::kTooLittleOverlap);
+  EXPECT_TRUE(match_loop(empty, room(false), Pose(), strict, LoopGates()).verified());
+}
+
+TEST(LoopMatcher, DoesNotAskForWhatIsHidden) {
+  // The candidate's outer walls stand behind the partitions that surround the body.
+  const std::vector<Eigen::Vector3d> all = room(true);
+  std::vector<Eigen::Vector3d> inside;
+  for (const Eigen::Vector3d& p : all) {
+    if (std::abs(p.x()) < 4.1 && std::abs(p.z()) < 2.6) inside.push_back(p);
+  }
+  EXPECT_GT(match_loop(cloud_of(inside), all, Pose(), LoopMatcherConfig(), LoopGates()).overlap, 0.9);
 }
 
 TEST(LoopMatcher, LeavesTheDirectionOfACorridorFree) {

@@ -46,13 +46,9 @@ PoseGraph random_graph() {
   PoseGraph graph;
   for (int i = 0; i < 6; ++i) graph.vertices.push_back({3 * i, pose()});
   for (int i = 1; i < 6; ++i) {
-    PoseGraphEdge edge{3 * (i - 1), 3 * i, pose(), Matrix6d::Zero(), i == 4};
-    for (int row = 0; row < 6; ++row) {
-      for (int column = row; column < 6; ++column) {
-        edge.information(row, column) = edge.information(column, row) = normal(random);
-      }
-    }
-    graph.edges.push_back(edge);
+    Matrix6d root;
+    for (double& number : root.reshaped()) number = normal(random);
+    graph.edges.push_back({3 * (i - 1), 3 * i, pose(), root.transpose() * root, i == 4});
   }
   return graph;
 }
@@ -91,6 +87,26 @@ TEST_F(PoseGraphFile, WritesTranslationFirstAndFixesTheFirstVertex) {
             "EDGE_SE3:QUAT 0 1 1 2 3 0 0 0 1 1 0 0 0 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n");
 }
 
+TEST_F(PoseGraphFile, ReadsPlanarRecordsInAnyOrderAndWritesThemBack) {
+  write_text("EDGE_SE2 4 9 1 2 0.5 10 1 2 20 3 30\nVERTEX_SE2 4 0 0 0\nVERTEX_SE2 9 1 2 0.5\n");
+  const PoseGraph graph = read_pose_graph(file_);
+  ASSERT_TRUE(graph.planar);
+  ASSERT_EQ(graph.edges.size(), 1U);
+  const PoseGraphEdge& edge = graph.edges[0];
+  EXPECT_EQ(edge.T_from_to.translation, Eigen::Vector3d(1.0, 2.0, 0.0));
+  EXPECT_NEAR(so3::log(edge.T_from_to.rotation).z(), 0.5, 1e-15);
+  EXPECT_EQ(edge.information(3, 3), 10.0);  // x
+  EXPECT_EQ(edge.information(3, 4), 1.0);   // x, y
+  EXPECT_EQ(edge.information(3, 2), 2.0);   // x, heading
+  EXPECT_EQ(edge.information(2, 2), 30.0);  // heading
+  EXPECT_EQ(edge.information(5, 5), 30.0);  // z, which SE2 does not know
+  write_pose_graph(file_, graph);
+  const PoseGraph back = read_pose_graph(file_);
+  EXPECT_TRUE(back.planar);
+  EXPECT_EQ(back.edges[0].information, edge.information);
+  EXPECT_LT(body_difference(back.vertices[1].T_map_body, graph.vertices[1].T_map_body).norm(), 1e-12);
+}
+
 TEST_F(PoseGraphFile, NamesFileLineAndReason) {
   EXPECT_TRUE(contains(complaint(), "cannot be opened"));
   write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 0 0 nan 0 0 0 1\n");
@@ -100,10 +116,20 @@ TEST_F(PoseGraphFile, NamesFileLineAndReason) {
   EXPECT_TRUE(contains(complaint(), "unit length"));
   write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n");
   EXPECT_TRUE(contains(complaint(), "twice"));
-  write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nEDGE_SE3:QUAT 0 7 0 0 0 0 0 0 1\n");
-  EXPECT_TRUE(contains(complaint(), "unknown vertex"));
-  write_text("VERTEX_SE2 0 0 0 0\n");
-  EXPECT_TRUE(contains(complaint(), "VERTEX_SE2"));
+  write_text(
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nEDGE_SE3:QUAT 0 7 0 0 0 0 0 0 1 "
+      "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n");
+  EXPECT_TRUE(contains(complaint(), ":2: the edge names an unknown vertex, 7"));
+  write_text("VERTEX_XY 0 0 0\n");
+  EXPECT_TRUE(contains(complaint(), "VERTEX_XY"));
+  write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE2 1 0 0 0\n");
+  EXPECT_TRUE(contains(complaint(), ":2: SE2 and SE3 records are mixed"));
+  write_text("VERTEX_SE2 0 0 0 0 0\n");
+  EXPECT_TRUE(contains(complaint(), "too long"));
+  write_text("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 0 1 0 0 1 0 0 1 0 1\n");
+  EXPECT_TRUE(contains(complaint(), "to itself"));
+  write_text("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 0 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1\n");
+  EXPECT_TRUE(contains(complaint(), ":3: the information has a negative direction"));
 }
 
 }  // namespace

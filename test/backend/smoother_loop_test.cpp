@@ -92,7 +92,7 @@ TEST(SmootherLoops, SayWhyThereIsNone) {
   }
 }
 
-TEST(SmootherLoops, WithdrawAFalseOneBeforeAnyoneSeesIt) {
+TEST(SmootherLoops, RefuseWhatOdometryCannotExplain) {
   const testing::Drive drive = testing::make_drive({.seed = 6, .keyframes = 30});
   Smoother smoother = run(drive, without_loops());
   const auto before = poses_of(smoother);
@@ -101,7 +101,29 @@ TEST(SmootherLoops, WithdrawAFalseOneBeforeAnyoneSeesIt) {
   const Pose T_to_from = perturbed_in_body(before[2].inverse() * before[24], lie);
   const SmootherUpdate update = smoother.add_loop({24, 2, T_to_from, information(0.003, 0.02)});
   ASSERT_TRUE(update.loop);
+  EXPECT_EQ(update.loop->reason, LoopReason::kContradictsOdometry);
+  EXPECT_EQ(update.loop->stage, LoopStage::kVerified);
+  EXPECT_GT(update.loop->chi_square, update.loop->chi_square_bound);
+  EXPECT_EQ(smoother.stats().loops_kept, 0);
+  EXPECT_EQ(smoother.stats().loops_waiting, 0);
+  const auto after = poses_of(smoother);
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i].translation, before[i].translation);
+}
+
+TEST(SmootherLoops, WithdrawAFalseOneBeforeAnyoneSeesIt) {
+  const testing::Drive drive = testing::make_drive({.seed = 6, .keyframes = 30});
+  BackendConfig config = without_loops();
+  config.loop_drift_scale = 100.0;  // neither odometry nor other loops object: only the graph does
+  config.loop_support_beyond_m = 1000.0;
+  Smoother smoother = run(drive, config);
+  const auto before = poses_of(smoother);
+  Vector6d lie;
+  lie << 0.0, 0.3, 0.0, 2.0, 0.0, 2.2;
+  const Pose T_to_from = perturbed_in_body(before[2].inverse() * before[24], lie);
+  const SmootherUpdate update = smoother.add_loop({24, 2, T_to_from, information(0.003, 0.02)});
+  ASSERT_TRUE(update.loop);
   EXPECT_EQ(update.loop->reason, LoopReason::kWithdrawn);
+  EXPECT_EQ(update.loop->stage, LoopStage::kWithdrawn);
   EXPECT_EQ(smoother.stats().loops_kept, 0);
   EXPECT_EQ(smoother.stats().loops_withdrawn, 1);
   const auto after = poses_of(smoother);
@@ -140,7 +162,7 @@ TEST(SmootherLoops, WithdrawAnEarlierOneOnceOthersContradictIt) {
   for (int i = 0; i < 40 && withdrawn.empty(); ++i) {
     const SmootherUpdate update = smoother.add_loop({22, 1, T_true, information(0.02, 0.1)});
     EXPECT_TRUE(update.loop->accepted()) << update.loop->reason_text;
-    withdrawn = update.withdrawn;
+    withdrawn = update.changed;
     EXPECT_TRUE(withdrawn.empty() || i > 3);
   }
   ASSERT_EQ(withdrawn.size(), 1U);

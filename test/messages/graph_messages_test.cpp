@@ -56,6 +56,10 @@ TEST(LoopMessages, CarryOutcomeFiguresAndWords) {
   result.from_id = 30;
   result.to_id = 2;
   result.mean_residual = 0.07;
+  result.overlap = 0.8;
+  result.chi_square = 3.5;
+  result.chi_square_bound = 22.5;
+  result.stage = LoopStage::kCandidate;
   result.T_to_from.translation = {1.0, 2.0, 3.0};
   const loop_result_t message = to_message(result, 5);
   EXPECT_EQ(message.reason, loop_result_t::RESIDUAL_TOO_LARGE);
@@ -64,7 +68,28 @@ TEST(LoopMessages, CarryOutcomeFiguresAndWords) {
   EXPECT_EQ(message.session, 5);
   EXPECT_EQ(message.from_id, 30);
   EXPECT_EQ(message.mean_residual, 0.07);
+  EXPECT_EQ(message.overlap, 0.8);
+  EXPECT_EQ(message.chi_square, 3.5);
+  EXPECT_EQ(message.chi_square_bound, 22.5);
+  EXPECT_EQ(message.stage, loop_result_t::CANDIDATE);
   EXPECT_EQ(message.relative_position[2], 3.0);
+}
+
+TEST(LoopMessages, NumberReasonsAndStagesAsTheCoreDoes) {
+  const auto reason = [](LoopReason value) { return static_cast<std::int8_t>(value); };
+  const auto stage = [](LoopStage value) { return static_cast<std::int8_t>(value); };
+  EXPECT_EQ(reason(LoopReason::kWithdrawn), loop_result_t::WITHDRAWN);
+  EXPECT_EQ(reason(LoopReason::kTooLittleOverlap), loop_result_t::TOO_LITTLE_OVERLAP);
+  EXPECT_EQ(reason(LoopReason::kContradictsOdometry), loop_result_t::CONTRADICTS_ODOMETRY);
+  EXPECT_EQ(reason(LoopReason::kContradictsLoops), loop_result_t::CONTRADICTS_LOOPS);
+  EXPECT_EQ(reason(LoopReason::kNeedsSupport), loop_result_t::NEEDS_SUPPORT);
+  EXPECT_EQ(reason(LoopReason::kKept), loop_result_t::KEPT);
+  EXPECT_EQ(reason(LoopReason::kVetoed), loop_result_t::VETOED);
+  EXPECT_EQ(stage(LoopStage::kNone), loop_result_t::NO_LOOP);
+  EXPECT_EQ(stage(LoopStage::kVerified), loop_result_t::VERIFIED);
+  EXPECT_EQ(stage(LoopStage::kOnTrial), loop_result_t::ON_TRIAL);
+  EXPECT_EQ(stage(LoopStage::kKept), loop_result_t::STAGE_KEPT);
+  EXPECT_EQ(stage(LoopStage::kWithdrawn), loop_result_t::STAGE_WITHDRAWN);
 }
 
 }  // namespace

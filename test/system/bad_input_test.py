@@ -9,7 +9,16 @@ from pathlib import Path
 
 import pytest
 
-EXECUTABLES = ["l1_driver", "l1_tool", "l1_sim", "lio_frontend", "graph_backend", "map_builder", "lio_replay"]
+EXECUTABLES = [
+    "l1_driver",
+    "l1_tool",
+    "l1_sim",
+    "lio_frontend",
+    "graph_backend",
+    "graph_optimiser",
+    "map_builder",
+    "lio_replay",
+]
 REQUIRED = {"l1_sim": ["--scene", "none.json"], "l1_tool": ["version"]}
 
 

@@ -2,18 +2,21 @@
 """What l1_sim writes: its log against its capture, its list of faults, and its refusals."""
 
 import csv
+import json
 import os
 from pathlib import Path
 
 import pytest
 
 from ignis.importers.l1_capture import import_capture
-from ignis.logs import read_events, read_log
+from ignis.logs import PartAssembler, joined_arrays, read_events, read_log
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
 SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
 SECONDS = 5
+SPINNING_CONFIG = CHECKOUT / "config" / "spinning.json"
+BEAMS, COLUMNS = 32, 512
 
 
 @pytest.fixture
@@ -112,3 +115,59 @@ def test_bad_udp_addresses_are_refused(simulate, address: str) -> None:
     done = simulate("--udp", address)
     assert done.returncode == 2
     assert "HOST:PORT" in done.stderr
+
+
+@pytest.fixture
+def spinning(run_binary, tmp_path: Path):
+    """Runs l1_sim over the short hall with a spinning LiDAR; returns the finished process."""
+    drive = json.loads(SCENE.read_text())
+    drive["geometry"] = str(SCENE.parent / drive["geometry"])
+    drive["lidar"] = {"model": "spinning", "spinning": {"beams": BEAMS, "columns": COLUMNS, "min_range_m": 0.0}}
+    scene = tmp_path / "spinning.json"
+    scene.write_text(json.dumps(drive))
+
+    def run(*arguments: object):
+        return run_binary(
+            "l1_sim", "--scene", scene, "--config", SPINNING_CONFIG, "--duration", SECONDS, *arguments, seconds=120
+        )
+
+    return run
+
+
+def test_spinning_lidar_writes_scans_in_parts_with_the_truth(spinning, tmp_path: Path) -> None:
+    first, second, truth = tmp_path / "first.lcm", tmp_path / "second.lcm", tmp_path / "truth.tum"
+    assert spinning("--log", first, "--ground-truth", truth).returncode == 0
+    assert spinning("--log", second).returncode == 0
+    assert first.read_bytes() == second.read_bytes()
+    stamps = [event.utime for event in read_events(first)]
+    assert stamps == sorted(stamps)
+    events = list(read_log(first))
+    parts = [event.message for event in events if event.channel == "L1_SCAN"]
+    assert all(len(event.data) < 64000 for event in read_events(first))
+    assembler = PartAssembler()
+    scans = [joined_arrays(whole) for part in parts if (whole := assembler.add(part)) is not None]
+    assert len(scans) == SECONDS * 10 and len(parts) == 6 * len(scans)
+    assert all(len(scan["x"]) == BEAMS * COLUMNS for scan in scans)
+    samples = [event.message for event in events if event.channel == "L1_IMU"]
+    poses = [event.message for event in events if event.channel == "GROUND_TRUTH"]
+    rows = [line for line in truth.read_text().splitlines() if not line.startswith("#")]
+    assert len(samples) == len(poses) == len(rows) == SECONDS * 200 + 1
+
+
+def test_replay_follows_the_spinning_lidar(spinning, run_binary, tmp_path: Path) -> None:
+    log, out = tmp_path / "drive.lcm", tmp_path / "out"
+    assert spinning("--log", log).returncode == 0
+    done = run_binary("lio_replay", log, "--config", SPINNING_CONFIG, "--out", out, seconds=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len((out / "eskf.tum").read_text().splitlines()) > 20
+
+
+def test_spinning_lidar_has_no_bytes_to_send_or_to_spoil(spinning, tmp_path: Path) -> None:
+    done = spinning("--capture", tmp_path / "a.bin", "--fault", "drop=0.1", "--id-modulus", 100)
+    assert done.returncode == 2
+    for part in ("spinning", "--capture", "--fault", "--id-modulus", "--log FILE"):
+        assert part in done.stderr, done.stderr
+    for output in (("--udp", "127.0.0.1:5000"), ("--pty", tmp_path / "line")):
+        done = spinning(*output)
+        assert done.returncode == 2 and output[0] in done.stderr, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["spinning.json"]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drives of a benchmark: one simulated log per scene and seed, and the same data in the form that peers take."""
 
+import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,16 +18,22 @@ class Drive:
     """One input: the same measurements in two files, and the truth."""
 
     scene: str
+    sensor: str  # "l1" or "spinning"
     seed: int
     log: Path
     arrays: Path
     truth: Path
 
 
+def sensor_of(scene: Path) -> str:
+    """Model of the LiDAR that a scene file asks for."""
+    return json.loads(scene.read_text(encoding="utf-8")).get("lidar", {}).get("model", "l1")
+
+
 def make_drive(l1_sim: Path, scene: Path, seed: int, config: Path, folder: Path) -> Drive:
     """Simulates the drive unless an earlier run left it there complete."""
     out = folder / f"{scene.stem}_{seed}"
-    drive = Drive(scene.stem, seed, out / "drive.lcm", out / "drive.npz", out / "ground_truth.tum")
+    drive = Drive(scene.stem, sensor_of(scene), seed, out / "drive.lcm", out / "drive.npz", out / "ground_truth.tum")
     if drive.arrays.exists():
         return drive
     out.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/sim/l1_beam.h"
 
-#include <algorithm>
 #include <cmath>
 #include <format>
 #include <numbers>
@@ -39,19 +38,10 @@ Ray beam(const l1::Auxiliary& packet, std::size_t j) {
           {cos_beta * a - sin_beta * b, sin_beta * a + cos_beta * b, c}};
 }
 
-double visible_range(const L1BeamConfig& config, double brightness) {
-  const double growth = std::log(config.range_at_90_percent_m / config.range_at_10_percent_m) / std::log(9.0);
-  return config.range_at_90_percent_m * std::pow(std::max(brightness, 0.0) / 0.9, growth);
-}
-
 std::uint16_t range_on_grid(const L1BeamConfig& config, double range_m) {
   if (range_m < config.min_range_m || range_m >= kMaxRangeM) return 0;
   const double steps = std::round(range_m * 1e3 / config.range_grid_mm);
   return static_cast<std::uint16_t>(std::lround(steps * config.range_grid_mm));
-}
-
-std::uint8_t grey_value(double brightness) {
-  return static_cast<std::uint8_t>(std::lround(20.0 + 235.0 * std::clamp(brightness, 0.0, 1.0)));
 }
 
 }  // namespace ignis::sim

@@ -50,14 +50,7 @@ struct L1BeamConfig {
 /// Ray of point j of a packet in the sensor frame [m]; the slant range counts from the ray's origin.
 [[nodiscard]] Ray beam(const l1::Auxiliary& packet, std::size_t j);
 
-/// Farthest range [m] at which a surface still answers. `brightness` is reflectivity times the cosine of incidence
-/// (Lambert); the range grows with a power of it through the two points of the data sheet.
-[[nodiscard]] double visible_range(const L1BeamConfig& config, double brightness);
-
 /// A measured range as the wire carries it [mm]: on the converter's grid, 0 when it cannot be expressed.
 [[nodiscard]] std::uint16_t range_on_grid(const L1BeamConfig& config, double range_m);
-
-/// Grey value of a return, 20..255.
-[[nodiscard]] std::uint8_t grey_value(double brightness);
 
 }  // namespace ignis::sim

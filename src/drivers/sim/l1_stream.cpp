@@ -8,6 +8,7 @@
 #include "common/config_check.h"
 #include "common/frames.h"
 #include "drivers/mavlink_frame.h"
+#include "drivers/sim/surface_return.h"
 
 namespace ignis::sim {
 namespace {
@@ -32,6 +33,13 @@ const DeviceConfig& checked(const DeviceConfig& device) {
   return device;
 }
 
+const L1BeamConfig& checked(const LidarConfig& lidar) {
+  if (lidar.is_spinning()) {
+    throw config::ConfigError(config::Offences{{"lidar.model", '"' + lidar.model + '"', "\"l1\""}});
+  }
+  return lidar.l1;
+}
+
 std::array<float, 3> to_floats(const Eigen::Vector3d& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
@@ -44,7 +52,7 @@ Utime StreamFrame::end_utime() const {
 
 L1Stream::L1Stream(const SceneConfig& scene, const Extrinsics& extrinsics, std::uint64_t seed,
                    std::optional<double> max_duration_s, const DeviceConfig& device)
-    : lidar_(scene.lidar),
+    : lidar_(checked(scene.lidar)),
       device_(checked(device)),
       scene_(make_ray_scene(scene)),
       trajectory_(scene.trajectory),
@@ -265,7 +273,7 @@ void L1Stream::cast_point(l1::Auxiliary& packet, std::size_t j) {
   if (!hit || lost) return;
 
   const double brightness = hit->reflectivity * std::abs(hit->normal.dot(ray_world.direction));
-  if (hit->distance > visible_range(lidar_, brightness)) return;
+  if (hit->distance > visible_range(lidar_.range_at_10_percent_m, lidar_.range_at_90_percent_m, brightness)) return;
   const std::uint16_t range_mm = range_on_grid(lidar_, hit->distance + noise);
   pending_distance_->ranges_mm[j] = range_mm;
   if (range_mm > 0) packet.reflectivity[j] = grey_value(brightness);

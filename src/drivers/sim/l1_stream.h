@@ -30,7 +30,8 @@ struct StreamFrame {
 /// the same bytes; pacing is the caller's.
 class L1Stream {
  public:
-  /// Ends after `max_duration_s` or with the drive. Throws config::ConfigError for an impossible drive or device.
+  /// Ends after `max_duration_s` or with the drive. Throws config::ConfigError for an impossible drive or device, and
+  /// for a scene whose LiDAR is not an L1.
   L1Stream(const SceneConfig& scene, const Extrinsics& extrinsics, std::uint64_t seed,
            std::optional<double> max_duration_s = std::nullopt, const DeviceConfig& device = {});
 

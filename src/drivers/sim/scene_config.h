@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "drivers/sim/imu_model.h"
-#include "drivers/sim/l1_beam.h"
+#include "drivers/sim/lidar_config.h"
 #include "drivers/sim/mesh_config.h"
 #include "drivers/sim/mover_config.h"
 #include "drivers/sim/ray_scene.h"
@@ -26,7 +26,7 @@ struct SceneConfig {
   std::vector<MoverConfig> movers;
   TrajectoryConfig trajectory;
   ImuModelConfig imu;
-  L1BeamConfig lidar;
+  LidarConfig lidar;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.text("description", self.description, "what the scene is for");

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "drivers/sim/scene_config.h"
+
 namespace ignis::sim::test {
 
 inline std::filesystem::path scene_folder() { return std::filesystem::path(IGNIS_CONFIG_DIR) / "scenes"; }
@@ -17,6 +19,13 @@ inline std::vector<std::string> shipped_scenes() {
     if (entry.path().extension() == ".json") names.push_back(entry.path().filename().string());
   }
   std::ranges::sort(names);
+  return names;
+}
+
+/// Those whose LiDAR is of a model.
+inline std::vector<std::string> shipped_scenes(const std::string& model) {
+  std::vector<std::string> names = shipped_scenes();
+  std::erase_if(names, [&](const std::string& name) { return load_scene(scene_folder() / name).lidar.model != model; });
   return names;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 SceneConfig perfect_hall() {
   SceneConfig scene = load_scene(std::string(IGNIS_CONFIG_DIR) + "/scenes/battery_hall_quick.json");
-  scene.lidar.range_noise_m = 0.0;
+  scene.lidar.l1.range_noise_m = 0.0;
   scene.imu = {
       .gyro_noise = 0, .accel_noise = 0, .gyro_bias = 0, .accel_bias = 0, .gyro_bias_walk = 0, .accel_bias_walk = 0};
   return scene;
@@ -70,14 +70,14 @@ class RoundTrip : public ::testing::TestWithParam<std::string> {};
 /// Encoded, decoded, and put where the vehicle truly was at each point's instant: every return must lie on a surface.
 TEST_P(RoundTrip, PutsEveryReturnOnASurfaceWithinOneStepOfTheRangeGrid) {
   SceneConfig scene = load_scene(test::scene_folder() / GetParam());
-  scene.lidar.range_noise_m = 0.0;
+  scene.lidar.l1.range_noise_m = 0.0;
   const RayScene geometry = make_ray_scene(scene);
   constexpr double kSeconds = 20.0;
   L1Stream stream(scene, l1_extrinsics(), 1, kSeconds);
   DriverConfig config;
   config.time_source = "counters";
   const Pose T_body_lidar = l1_extrinsics().lidar.T_body_sensor();
-  const double step = scene.lidar.range_grid_mm * 1e-3;
+  const double step = scene.lidar.l1.range_grid_mm * 1e-3;
 
   l1::PacketStream packets(config);
   std::optional<std::int64_t> first;
@@ -103,7 +103,7 @@ TEST_P(RoundTrip, PutsEveryReturnOnASurfaceWithinOneStepOfTheRangeGrid) {
   EXPECT_EQ(packets.counters().scan_gaps + packets.counters().imu_gaps + packets.counters().rejected_values, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(AllScenes, RoundTrip, ::testing::ValuesIn(test::shipped_scenes()), test::kSceneName);
+INSTANTIATE_TEST_SUITE_P(AllScenes, RoundTrip, ::testing::ValuesIn(test::shipped_scenes("l1")), test::kSceneName);
 
 }  // namespace
 }  // namespace ignis::sim

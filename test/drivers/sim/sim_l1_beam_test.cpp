@@ -38,13 +38,6 @@ TEST(Beam, HasUnitDirectionForAnyCalibration) {
   for (std::size_t j = 0; j < l1::kPointsPerPacket; ++j) EXPECT_NEAR(beam(packet, j).direction.norm(), 1.0, 1e-12);
 }
 
-TEST(VisibleRange, MeetsBothPointsOfTheDataSheet) {
-  const L1BeamConfig config;
-  EXPECT_NEAR(visible_range(config, 0.9), 20.0, 1e-9);
-  EXPECT_NEAR(visible_range(config, 0.1), 10.0, 1e-9);
-  EXPECT_EQ(visible_range(config, 0.0), 0.0);
-}
-
 TEST(RangeOnGrid, StaysWithinHalfAStepAndOnTheGrid) {
   const L1BeamConfig config;
   for (double range = 0.06; range < 49.9; range += 0.0137) {
@@ -61,12 +54,6 @@ TEST(RangeOnGrid, ReportsNothingBelowTheBlindZoneAndBeyondTheSensor) {
   EXPECT_EQ(range_on_grid(config, -1.0), 0);
   EXPECT_EQ(range_on_grid(config, 50.0), 0);
   EXPECT_GT(range_on_grid(config, 0.051), 0);
-}
-
-TEST(GreyValue, SpansTheSensorsScale) {
-  EXPECT_EQ(grey_value(0.0), 20);
-  EXPECT_EQ(grey_value(1.0), 255);
-  EXPECT_LT(grey_value(0.3), grey_value(0.6));
 }
 
 TEST(L1BeamConfig, RefusesAFartherRangeForDarkThanForBright) {

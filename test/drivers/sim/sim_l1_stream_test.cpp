@@ -84,7 +84,7 @@ TEST(L1Stream, EndsWithTheDrive) {
 /// more while turning, so this also proves that each point has its own time.
 TEST(L1Stream, PointsLieOnTheSurfacesSeenFromThePoseOfTheirOwnInstant) {
   SceneConfig scene = room();
-  scene.lidar.range_noise_m = 0.0;
+  scene.lidar.l1.range_noise_m = 0.0;
   const RayScene geometry = make_ray_scene(scene);
   const Pose T_body_lidar = tilted_forward().lidar.T_body_sensor();
   L1Stream stream(scene, tilted_forward(), 1);
@@ -100,7 +100,7 @@ TEST(L1Stream, PointsLieOnTheSurfacesSeenFromThePoseOfTheirOwnInstant) {
       const Ray ray = beam(auxiliary, j);
       const Pose T_world_lidar = stream.trajectory().at(t).T_world_body * T_body_lidar;
       const Eigen::Vector3d p_world = T_world_lidar * (ray.origin + 1e-3 * distance.ranges_mm[j] * ray.direction);
-      ASSERT_LT(std::abs(geometry.clearance(p_world)), 0.5e-3 * scene.lidar.range_grid_mm + 0.6e-3);
+      ASSERT_LT(std::abs(geometry.clearance(p_world)), 0.5e-3 * scene.lidar.l1.range_grid_mm + 0.6e-3);
       ++points;
     }
   }
@@ -110,11 +110,11 @@ TEST(L1Stream, PointsLieOnTheSurfacesSeenFromThePoseOfTheirOwnInstant) {
 TEST(L1Stream, HasTheRangeNoiseAndTheLossesOfItsConfiguration) {
   SceneConfig scene = room();
   scene.trajectory.waypoints[0].rest_s = 10.0;
-  scene.lidar.range_grid_mm = 1.0;
-  scene.lidar.range_noise_m = 0.02;
-  scene.lidar.invalid_fraction = 0.1;
-  scene.lidar.range_at_10_percent_m = 40.0;
-  scene.lidar.range_at_90_percent_m = 40.0;
+  scene.lidar.l1.range_grid_mm = 1.0;
+  scene.lidar.l1.range_noise_m = 0.02;
+  scene.lidar.l1.invalid_fraction = 0.1;
+  scene.lidar.l1.range_at_10_percent_m = 40.0;
+  scene.lidar.l1.range_at_90_percent_m = 40.0;
   const RayScene geometry = make_ray_scene(scene);
   L1Stream stream(scene, tilted_forward(), 1, 2.0);
   const Pose T_world_lidar = stream.truth_at(0).T_world_body * tilted_forward().lidar.T_body_sensor();
@@ -164,14 +164,15 @@ TEST(L1Stream, ReportsTheImuInItsOwnAxesWithTheSensorsQuaternion) {
 
 TEST(L1Stream, ReportsYawWithTheErrorAskedForButMeasuresAtTheTrueOne) {
   SceneConfig scene = room();
-  scene.lidar.yaw_error_deg = 0.6;
+  scene.lidar.l1.yaw_error_deg = 0.6;
   const std::vector<StreamFrame> frames = frames_of(scene, 1, 2.0);
   double square = 0.0;
   int packets = 0;
   for (const StreamFrame& frame : frames) {
     if (frame.message_id != l1::kAuxiliaryId) continue;
     const l1::Auxiliary auxiliary = l1::decode_auxiliary(payload_of(frame));
-    const double truth = scene.lidar.yaw_start_deg + 360.0 * scene.lidar.yaw_rate_hz * auxiliary.packet_id / 180.0;
+    const double truth =
+        scene.lidar.l1.yaw_start_deg + 360.0 * scene.lidar.l1.yaw_rate_hz * auxiliary.packet_id / 180.0;
     const double error = std::remainder(auxiliary.yaw_start_deg - truth, 360.0);
     square += error * error;
     ++packets;
@@ -181,7 +182,7 @@ TEST(L1Stream, ReportsYawWithTheErrorAskedForButMeasuresAtTheTrueOne) {
 
 TEST(L1Stream, WritesFullPayloadsWhenToldNotToTrim) {
   SceneConfig scene = room();
-  scene.lidar.trim_payloads = false;
+  scene.lidar.l1.trim_payloads = false;
   for (const StreamFrame& frame : frames_of(scene, 1, 0.2)) {
     EXPECT_EQ(static_cast<std::size_t>(frame.bytes[1]), l1::message_info(frame.message_id)->length);
   }

@@ -7,11 +7,26 @@
 #include "common/frames.h"
 #include "drivers/sim/scene_config.h"
 #include "drivers/sim/shipped_scenes.h"
+#include "drivers/sim/surface_return.h"
 
 namespace ignis::sim {
 namespace {
 
 using test::scene_folder;
+
+/// The beams of a turn of a spinning LiDAR that stands level over the body origin, thinned out.
+std::vector<Ray> turn(const SpinningConfig& lidar, const Motion& motion) {
+  const Eigen::Matrix3d R_world_lidar =
+      (motion.T_world_body.rotation * frames::q_body_from_forward_left_up()).toRotationMatrix();
+  std::vector<Ray> rays;
+  for (int column = 0; column < lidar.columns; column += 16) {
+    const Eigen::AngleAxisd turned(column_azimuth(lidar, column), Eigen::Vector3d::UnitZ());
+    for (const Eigen::Vector3d& direction : column_directions(lidar)) {
+      rays.push_back({motion.T_world_body.translation, R_world_lidar * (turned * direction)});
+    }
+  }
+  return rays;
+}
 
 /// The L1's hemisphere, leaning 45 degrees forward, at an instant of the drive.
 std::vector<Ray> hemisphere(const Motion& motion) {
@@ -65,14 +80,19 @@ TEST_P(ShippedScenes, ShowTheSensorSomethingAllTheTime) {
   const SceneConfig scene = load_scene(scene_folder() / GetParam());
   const Trajectory drive(scene.trajectory);
   const RayScene geometry = make_ray_scene(scene);
+  const SpinningConfig& spinning = scene.lidar.spinning;
+  const bool spins = scene.lidar.is_spinning();
+  const double limit = spins ? spinning.max_range_m : 21.0;
+  const double at_10_percent = spins ? spinning.range_at_10_percent_m : scene.lidar.l1.range_at_10_percent_m;
+  const double at_90_percent = spins ? spinning.range_at_90_percent_m : scene.lidar.l1.range_at_90_percent_m;
   for (double t = 0.0; t < drive.duration(); t += 1.0) {
     int returns = 0;
-    const std::vector<Ray> rays = hemisphere(drive.at(t));
+    const std::vector<Ray> rays = spins ? turn(spinning, drive.at(t)) : hemisphere(drive.at(t));
     for (const Ray& ray : rays) {
-      const std::optional<Hit> hit = geometry.cast(ray, 21.0, t);
+      const std::optional<Hit> hit = geometry.cast(ray, limit, t);
       if (!hit) continue;
       const double brightness = hit->reflectivity * std::abs(hit->normal.dot(ray.direction));
-      returns += hit->distance <= visible_range(scene.lidar, brightness) ? 1 : 0;
+      returns += hit->distance <= visible_range(at_10_percent, at_90_percent, brightness) ? 1 : 0;
     }
     ASSERT_GT(returns, 0.5 * static_cast<double>(rays.size())) << t;
   }

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "journal_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <format>
+#include <fstream>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "runtime/application.h"
+
+namespace ignis {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kName = "graph_backend.journal";
+constexpr const char* kLockName = "graph_backend.lock";
+constexpr std::chrono::seconds kRetryPeriod{1};
+constexpr std::size_t kMaxPending = 256U << 20U;  // some thousand keyframes
+
+}  // namespace
+
+std::size_t LoadedJournal::end_of(std::size_t records) const {
+  if (records == contents.payloads.size()) return contents.whole_bytes;
+  // The frame of the next record begins where the one before it ends.
+  if (records > 0) {
+    const std::span<const std::byte> last = contents.payloads[records - 1];
+    return static_cast<std::size_t>(last.data() + last.size() - bytes.data());
+  }
+  return encode_head(contents.head).size();
+}
+
+JournalFile::JournalFile(fs::path folder) : path_(folder / kName) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw runtime::UserError(std::format("cannot make the folder {}: {}", folder.string(), error.message()));
+  const fs::path lock_path = folder / kLockName;
+  lock_ = ::open(lock_path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  if (lock_ < 0) {
+    throw runtime::UserError(
+        std::format("{}: {}; --journal needs a folder that it may write to", lock_path.string(), std::strerror(errno)));
+  }
+  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    throw runtime::UserError(std::format("another graph_backend uses the journal in {}", folder.string()),
+                             runtime::kFailed);
+  }
+}
+
+JournalFile::~JournalFile() {
+  if (file_ >= 0) {
+    write_pending();
+    fdatasync(file_);
+    close(file_);
+  }
+  close(lock_);
+}
+
+std::optional<LoadedJournal> JournalFile::load() const {
+  std::error_code error;
+  if (!fs::exists(path_, error)) return std::nullopt;
+  LoadedJournal loaded;
+  std::ifstream in(path_, std::ios::binary);
+  loaded.bytes.resize(fs::file_size(path_, error));
+  if (error || !in.read(reinterpret_cast<char*>(loaded.bytes.data()), std::ssize(loaded.bytes))) {
+    throw runtime::UserError(std::format("{}: cannot be read", path_.string()), runtime::kFailed);
+  }
+  loaded.contents = read_journal(loaded.bytes);
+  return loaded;
+}
+
+fs::path JournalFile::free_name(const char* suffix) const {
+  for (int number = 1;; ++number) {
+    fs::path candidate = path_;
+    candidate += std::format(".{}{}", suffix, number);
+    std::error_code error;
+    if (!fs::exists(candidate, error)) return candidate;
+  }
+}
+
+fs::path JournalFile::set_aside() {
+  if (file_ >= 0) {
+    write_pending();
+    close(file_);
+    file_ = -1;
+  }
+  pending_.clear();
+  std::error_code error;
+  if (!fs::exists(path_, error)) return {};
+  fs::path kept = free_name("old");
+  fs::rename(path_, kept, error);
+  if (error) fail("cannot be renamed", error.value());
+  return kept;
+}
+
+void JournalFile::begin(const JournalHead& head) {
+  set_aside();
+  failure_.clear();
+  given_up_ = false;
+  open(O_CREAT | O_TRUNC, 0);
+  const std::vector<std::byte> bytes = encode_head(head);
+  pending_.insert(pending_.end(), bytes.begin(), bytes.end());
+  write_pending();
+}
+
+void JournalFile::resume(std::size_t size, bool keep_copy) {
+  if (keep_copy) {
+    std::error_code error;
+    fs::copy_file(path_, free_name("damaged"), error);
+    if (error) throw runtime::UserError(std::format("{}: cannot be copied: {}", path_.string(), error.message()));
+  }
+  open(0, size);
+}
+
+void JournalFile::open(int flags, std::size_t size) {
+  file_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC | flags, 0644);
+  size_ = size;
+  if (file_ < 0 || ftruncate(file_, static_cast<off_t>(size)) != 0) fail("cannot be opened", errno);
+}
+
+void JournalFile::append(std::span<const std::byte> payload) {
+  if (given_up_) return;
+  const std::vector<std::byte> record = encode_record(payload);
+  pending_.insert(pending_.end(), record.begin(), record.end());
+  write_pending();
+  if (pending_.size() <= kMaxPending) return;
+  given_up_ = true;
+  pending_.clear();
+  failure_ += "; given up for this drive";
+}
+
+void JournalFile::maintain() {
+  const auto now = std::chrono::steady_clock::now();
+  if (!pending_.empty() && now - last_try_ > kRetryPeriod) write_pending();
+  if (!unsynced_ || now - last_sync_ < kSyncPeriod) return;
+  last_sync_ = now;
+  unsynced_ = false;
+  if (fdatasync(file_) != 0) fail("cannot be synced", errno);
+}
+
+/// All of it or nothing.
+void JournalFile::write_pending() {
+  last_try_ = std::chrono::steady_clock::now();
+  if (file_ < 0) return;
+  std::size_t written = 0;
+  while (written < pending_.size()) {
+    const ssize_t count =
+        pwrite(file_, pending_.data() + written, pending_.size() - written, static_cast<off_t>(size_ + written));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error = errno;
+      // Left in place, a torn record would only be overwritten by the next attempt.
+      static_cast<void>(ftruncate(file_, static_cast<off_t>(size_)));
+      fail("cannot be written", error);
+      return;
+    }
+    written += static_cast<std::size_t>(count);
+  }
+  size_ += written;
+  unsynced_ = unsynced_ || written > 0;
+  pending_.clear();
+  failure_.clear();
+}
+
+void JournalFile::fail(const std::string& what, int error) {
+  failure_ = std::format("the journal {}: {}", what, std::strerror(error));
+}
+
+}  // namespace ignis

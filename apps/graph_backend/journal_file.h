@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "backend/journal.h"
+
+namespace ignis {
+
+/// The bytes of a journal and what they hold; `contents` points into `bytes`.
+struct LoadedJournal {
+  std::vector<std::byte> bytes;
+  JournalContents contents;
+
+  /// Where the first `records` of them end.
+  [[nodiscard]] std::size_t end_of(std::size_t records) const;
+};
+
+/// The file DIR/graph_backend.journal, which one process at a time may use. A record is handed to the kernel at once,
+/// so a killed process loses none; it is on the disk within kSyncPeriod, so a power cut loses no more than that.
+/// Records that cannot be written (disk full) wait in memory and are tried again; the graph goes on.
+class JournalFile {
+ public:
+  static constexpr std::chrono::seconds kSyncPeriod{5};
+
+  /// Makes the folder and locks it. Throws runtime::UserError that names folder and reason.
+  explicit JournalFile(std::filesystem::path folder);
+  ~JournalFile();
+  JournalFile(const JournalFile&) = delete;
+  JournalFile& operator=(const JournalFile&) = delete;
+
+  /// What an earlier process has left; nothing when there is no file. Throws runtime::UserError when it cannot be read.
+  [[nodiscard]] std::optional<LoadedJournal> load() const;
+
+  /// Renames what is there, so that it is kept and never read again; its new path, empty when there was none.
+  std::filesystem::path set_aside();
+
+  /// Begins anew. What was there is set aside.
+  void begin(const JournalHead& head);
+
+  /// Goes on behind the first `size` bytes of what is there. The rest is cut off; with `keep_copy` the whole file is
+  /// copied beside it before.
+  void resume(std::size_t size, bool keep_copy);
+
+  /// Adds a record. What goes wrong shows in failure().
+  void append(std::span<const std::byte> payload);
+
+  /// Tries again what could not be written, and syncs when it is time.
+  void maintain();
+
+  /// Why records are waiting or lost; empty while all is well.
+  [[nodiscard]] const std::string& failure() const { return failure_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  void open(int flags, std::size_t size);
+  void write_pending();
+  void fail(const std::string& what, int error);
+  [[nodiscard]] std::filesystem::path free_name(const char* suffix) const;
+
+  std::filesystem::path path_;
+  int lock_ = -1;
+  int file_ = -1;
+  std::size_t size_ = 0;            ///< of whole records in the file
+  std::vector<std::byte> pending_;  ///< encoded, not yet in the file
+  bool given_up_ = false;
+  bool unsynced_ = false;
+  std::chrono::steady_clock::time_point last_sync_{};
+  std::chrono::steady_clock::time_point last_try_{};
+  std::string failure_;
+};
+
+}  // namespace ignis

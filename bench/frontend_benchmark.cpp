@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The kernels of the front end, one scan's worth per iteration, for an L1 (1,000 points) and for 128 beams (130,000).
+// Items are points unless said otherwise. The figures in the comments are CPU time on a virtual machine of 2.6 GHz with
+// 2 MB of second-level cache, busy with other work: good to a fifth. Run on one core:
+//   taskset -c 1 build/release/bin/frontend_benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true
+
+#include <benchmark/benchmark.h>
+
+#include "frontend/deskew.h"
+#include "frontend/eskf.h"
+#include "frontend/plane_fit.h"
+#include "frontend/scan_matcher.h"
+#include "frontend/scan_update.h"
+#include "frontend/voxel_downsample.h"
+#include "recorded_drive.h"
+
+namespace ignis::bench {
+namespace {
+
+/// A prediction as good as one between two scans: 5 mm, 0.5 mrad.
+FilterState prediction(const RecordedDrive& drive) {
+  FilterState filter{.nominal = drive.states.back()};
+  filter.covariance = Matrix15d::Identity() * 1e-6;
+  filter.covariance.block<3, 3>(kPosition, kPosition) *= 25.0;
+  filter.covariance.block<3, 3>(kVelocity, kVelocity) *= 100.0;
+  filter.nominal.T_odom_body.translation += Eigen::Vector3d(0.004, -0.002, 0.002);
+  return filter;
+}
+
+template <class Points>
+void count(benchmark::State& state, const Points& points) {
+  state.SetItemsProcessed(state.iterations() * std::ssize(points));
+  state.counters["points"] = static_cast<double>(points.size());
+}
+
+// Bound by arithmetic: one exponential of a rotation, so a sine, a cosine and a square root, for each point. 41 ns a
+// point at 2.6 GHz is 105 cycles; the 36 bytes that go in and out are 0.9 GB/s, a tenth of what one core can stream.
+// Points of one column share their instant: an exponential per column would leave memory as the bound.
+void deskew_scan(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const Scan& scan = drive.scans.back();
+  for (auto _ : state) benchmark::DoNotOptimize(deskew(scan, drive.states.back(), drive.imu, drive.config));
+  count(state, scan.points);
+}
+
+// An L1 scan is below max_scan_points and is only copied. 128 beams: 48 ns a point, bound by the hash table of the
+// voxels, whose lines are met in the order of the scan and not of the table; the points alone would stream in 0.4 ms.
+void thin_scan(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const std::vector<CloudPoint> cloud = last_cloud(drive);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(thin(cloud, drive.config.voxel_size_m, drive.config.max_scan_points));
+  }
+  count(state, cloud);
+}
+
+// 28 to 31 ns a point in voxels that the scan has met before: bound by the chain probe of the table - block of 1.2 kB -
+// voxel, each waiting for the cache line of the one before, not by the few operations on the point.
+void insert_into_map(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  LocalMap map = map_before_last(drive);
+  const std::vector<CloudPoint> cloud = last_cloud(drive);
+  std::vector<Eigen::Vector3f> points;
+  for (const CloudPoint& point : cloud) points.push_back(point.position);
+  for (auto _ : state) map.insert(points, drive.states.back().T_odom_body, true);
+  count(state, points);
+  state.counters["voxels"] = map.size();
+}
+
+// 400 ns a query for 11 to 13 neighbours. The sums are some 30 operations for each neighbour, 150 ns at one a cycle;
+// the rest are the probes of up to 27 blocks and the lines of the points in them. The dearest kernel of a match: to
+// gain, meet fewer blocks (blocks as wide as the search) or keep neighbours over the passes.
+void gather_neighbours(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const LocalMap map = map_before_last(drive);
+  const std::vector<Eigen::Vector3f> points = last_thinned(drive);
+  const Pose& T_odom_body = drive.states.back().T_odom_body;
+  double neighbours = 0.0;
+  for (auto _ : state) {
+    neighbours = 0.0;
+    for (const Eigen::Vector3f& point : points) {
+      neighbours += map.gather(T_odom_body * point.cast<double>().eval()).count;
+    }
+    benchmark::DoNotOptimize(neighbours);
+  }
+  count(state, points);
+  state.counters["neighbours"] = neighbours / static_cast<double>(points.size());
+}
+
+// 6 ns a voxel, each once in a quarter of a window: a stream over all blocks, and the table built anew. It happens
+// every 5 m (L1) or 20 m, so 1 ms is the peak that it adds to one scan, not a load.
+void slide_map(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const LocalMap full = map_before_last(drive);
+  const Eigen::Vector3d ahead =
+      drive.states.back().T_odom_body * Eigen::Vector3d(0, 0, -0.6 * drive.config.map_window_m);
+  for (auto _ : state) {
+    state.PauseTiming();
+    LocalMap map = full;
+    map.slide(drive.states.back().T_odom_body.translation);
+    state.ResumeTiming();
+    map.slide(ahead);
+    benchmark::DoNotOptimize(map.size());
+  }
+  state.SetItemsProcessed(state.iterations() * full.size());
+  state.counters["voxels"] = full.size();
+}
+
+// 170 to 190 ns: the closed-form eigenvalues of a 3x3 matrix (arc tangent, sine, cosine, square roots) follow one from
+// another, so latency bounds it, neither memory nor the number of operations. Several planes side by side in one vector
+// register would gain.
+void fit_planes(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const LocalMap map = map_before_last(drive);
+  std::vector<NeighbourMoments> moments;
+  for (const Eigen::Vector3f& point : last_thinned(drive)) {
+    moments.push_back(map.gather(drive.states.back().T_odom_body * point.cast<double>().eval()));
+  }
+  double planes = 0.0;
+  for (auto _ : state) {
+    planes = 0.0;
+    for (const NeighbourMoments& each : moments) {
+      planes += fit_plane(each, drive.config).verdict == PlaneVerdict::kPlane ? 1.0 : 0.0;
+    }
+    benchmark::DoNotOptimize(planes);
+  }
+  count(state, moments);
+  state.counters["planes"] = planes / static_cast<double>(moments.size());
+}
+
+// 0.8 to 0.9 us a point, two thirds of it gather and plane fit, met once as long as the iterate stays; the passes over
+// the constraints add some 100 ns a point each. Proportional to the points that go in, hence max_scan_points: a match
+// of 130,000 points costs no more than the 10,000 that thin_scan leaves.
+void match_scan(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const LocalMap map = map_before_last(drive);
+  const std::vector<Eigen::Vector3f> points = last_thinned(drive);
+  const FilterState predicted = prediction(drive);
+  ScanMatcher matcher(drive.config);
+  if (matcher.match(predicted, points, map).stats.reason != ScanReason::kApplied) {
+    state.SkipWithError("the scan was not applied");
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(matcher.match(predicted, points, map));
+  count(state, points);
+}
+
+// 1.9 us: F P F^T as two dense products of 15x15 is 13,500 operations, 7.3 per nanosecond and a third of what the two
+// 128-bit units of the portable instruction set could do. F is mostly zero and one: its blocks alone are a quarter of
+// it. Items are IMU samples.
+void predict_step(benchmark::State& state) {
+  const RecordedDrive& drive = recorded_drive("l1");
+  const FilterState start = prediction(drive);
+  const InertialInput input = midpoint(drive.imu[drive.imu.size() - 2], drive.imu.back());
+  constexpr int kSteps = 250;
+  for (auto _ : state) {
+    // From the same start again each second of data: left alone, the covariance would grow without bound.
+    FilterState filter = start;
+    for (int i = 0; i < kSteps; ++i) predict(filter, input, 0.004, drive.config);
+    benchmark::DoNotOptimize(filter);
+  }
+  state.SetItemsProcessed(state.iterations() * kSteps);
+}
+
+// 2.7 us whatever the number of points, three products of 15x15 and one 6x6 solve: nothing beside the match.
+// Items are steps of the iterated update.
+void update_step(benchmark::State& state) {
+  const RecordedDrive& drive = recorded_drive("l1");
+  const FilterState filter = prediction(drive);
+  PoseInformation constraints;
+  for (int i = 0; i < 1000; ++i) {
+    const double angle = 0.1 * i;
+    Vector6d h;
+    h << std::sin(angle), std::cos(2 * angle), std::sin(3 * angle), std::cos(angle), std::sin(2 * angle), 0.5;
+    constraints.add(h, 0.01 * std::sin(7 * angle), 1e-4);
+  }
+  const Vector15d deviation = Vector15d::Constant(1e-4);
+  for (auto _ : state) benchmark::DoNotOptimize(information_update(filter.covariance, deviation, constraints));
+  state.SetItemsProcessed(state.iterations());
+}
+
+#define IGNIS_BOTH_SENSORS(kernel)                                                 \
+  BENCHMARK_CAPTURE(kernel, l1, std::string("l1"))->Unit(benchmark::kMicrosecond); \
+  BENCHMARK_CAPTURE(kernel, spinning128, std::string("spinning128"))->Unit(benchmark::kMicrosecond)
+
+IGNIS_BOTH_SENSORS(deskew_scan);
+IGNIS_BOTH_SENSORS(thin_scan);
+IGNIS_BOTH_SENSORS(insert_into_map);
+IGNIS_BOTH_SENSORS(gather_neighbours);
+IGNIS_BOTH_SENSORS(slide_map);
+IGNIS_BOTH_SENSORS(fit_planes);
+IGNIS_BOTH_SENSORS(match_scan);
+BENCHMARK(predict_step);
+BENCHMARK(update_step);
+
+}  // namespace
+}  // namespace ignis::bench

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The smoother over long synthetic drives with loops: time per update as the graph grows, time to resume from the
+// journal, memory per keyframe. Bound by iSAM2: the elimination of what a loop touches, and the relinearisation that
+// follows a correction; without loops an update is one back-substitution over all poses.
+//
+//     ninja -C build/release benchmarks && build/release/bin/smoother_benchmark
+
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <vector>
+
+#include "backend/smoother.h"
+#include "backend/synthetic_drive.h"
+
+namespace ignis {
+namespace {
+
+constexpr int kKeyframesPerLap = 21;
+constexpr int kLoopEvery = 27;
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point began) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - began).count();
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+double resident_bytes() {
+  double pages_in_all = 0.0;
+  double resident = 0.0;
+  std::ifstream("/proc/self/statm") >> pages_in_all >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+/// A loop from keyframe `from` to the place one to three laps ago, as an exact match would measure it.
+LoopMeasurement true_loop(const testing::Drive& drive, int from) {
+  LoopMeasurement loop;
+  loop.from_id = from;
+  loop.to_id = from - kKeyframesPerLap * (1 + from % 3);
+  loop.T_to_from = drive.T_world_body[static_cast<std::size_t>(loop.to_id)].inverse() *
+                   drive.T_world_body[static_cast<std::size_t>(from)];
+  Vector6d information;
+  information << Eigen::Vector3d::Constant(1.0 / (0.003 * 0.003)), Eigen::Vector3d::Constant(1.0 / (0.02 * 0.02));
+  loop.information = information.asDiagonal();
+  return loop;
+}
+
+void drive(benchmark::State& state) {
+  const auto count = static_cast<int>(state.range(0));
+  const testing::Drive drive = testing::make_drive({.seed = 1, .keyframes = count});
+  BackendConfig config;
+  config.use_loop_closing = false;  // the search is another matter; loops are handed in
+  for (auto _ : state) {
+    const double before = resident_bytes();
+    Smoother smoother(config, LoopGates{});
+    std::vector<std::vector<std::byte>> records;
+    std::vector<double> updates;
+    std::vector<double> loops;
+    double bytes = 0.0;
+    for (const Keyframe& keyframe : drive.keyframes) {
+      const Clock::time_point began = Clock::now();
+      benchmark::DoNotOptimize(smoother.add_keyframe(keyframe));
+      updates.push_back(milliseconds_since(began));
+      if (keyframe.id > 3 * kKeyframesPerLap && keyframe.id % kLoopEvery == 0) {
+        const Clock::time_point loop_began = Clock::now();
+        benchmark::DoNotOptimize(smoother.add_loop(true_loop(drive, keyframe.id)));
+        loops.push_back(milliseconds_since(loop_began));
+      }
+    }
+    state.counters["kB/keyframe"] = (resident_bytes() - before) / 1e3 / count;
+    const Clock::time_point change_began = Clock::now();
+    records.push_back(smoother.take_change());
+    state.counters["record_ms"] = milliseconds_since(change_began);
+    for (const std::vector<std::byte>& record : records) bytes += static_cast<double>(record.size());
+    const std::vector<std::span<const std::byte>> spans(records.begin(), records.end());
+    const Clock::time_point resume_began = Clock::now();
+    const SmootherRestoration restoration = restore_smoother(config, LoopGates{}, spans);
+    state.counters["resume_ms"] = milliseconds_since(resume_began);
+    if (restoration.smoother.all_poses().size() != drive.keyframes.size()) state.SkipWithError("not resumed");
+    state.counters["p50_ms"] = quantile(updates, 0.5);
+    state.counters["p99_ms"] = quantile(updates, 0.99);
+    state.counters["last100_p50_ms"] = quantile({updates.end() - 100, updates.end()}, 0.5);
+    state.counters["loop_p50_ms"] = quantile(loops, 0.5);
+    state.counters["loop_max_ms"] = quantile(loops, 1.0);
+    state.counters["loops"] = smoother.stats().loops_kept;
+    state.counters["journal_kB/keyframe"] = bytes / 1e3 / count;
+  }
+}
+
+BENCHMARK(drive)->Arg(600)->Arg(2000)->Arg(10000)->Iterations(1)->Unit(benchmark::kSecond);
+
+}  // namespace
+}  // namespace ignis

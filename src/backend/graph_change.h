@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "backend/smoother_state.h"
+
+/// What one call changed in the graph, as the journal keeps it. All changes from the first one on, applied in order,
+/// give back the whole state and the points at which the solver had linearised, so that a solver built from them stands
+/// where the old one stood.
+namespace ignis {
+
+/// Where a keyframe's variables are linearised; fields named odom are in map.
+struct LinearisationPoint {
+  std::int32_t id = 0;
+  NavState state;
+};
+
+/// All that is known of loops. Factor ids are not kept: the solver gives new ones.
+struct LoopLists {
+  std::vector<GraphLoop> loops;
+  std::vector<GraphLoop> waiting;
+  std::vector<LoopVeto> vetoes;
+};
+
+struct GraphChange {
+  SmootherState state;             ///< scalars as they are now; nodes and clouds: the new ones alone; no loops
+  std::optional<LoopLists> loops;  ///< the lists as they are now, if anything in them changed
+  std::vector<LinearisationPoint> linearised;  ///< the new ones and those that moved
+};
+
+[[nodiscard]] std::vector<std::byte> encode_change(const GraphChange& change);
+
+/// Nothing when the bytes are no change. Never reads beyond them.
+[[nodiscard]] std::optional<GraphChange> decode_change(std::span<const std::byte> bytes);
+
+/// State and linearisation points by node, as the changes so far leave them.
+struct RestoredGraph {
+  SmootherState state;
+  std::vector<LinearisationPoint> linearised;
+
+  /// The reason why `change` cannot follow, and then nothing is altered; empty when it was applied.
+  [[nodiscard]] std::string apply(GraphChange change);
+};
+
+/// Finds what changed since it looked last.
+class ChangeTracker {
+ public:
+  ChangeTracker();
+
+  /// Begins at a graph that is known already.
+  explicit ChangeTracker(const RestoredGraph& known);
+
+  /// `linearised`: one per node of `state`.
+  [[nodiscard]] GraphChange next(const SmootherState& state, std::vector<LinearisationPoint> linearised);
+
+ private:
+  std::vector<LinearisationPoint> linearised_;
+  std::vector<std::byte> loops_;  ///< encoded
+};
+
+}  // namespace ignis

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/graph_restore.h"
+
+#include <gtsam/inference/Symbol.h>
+#include <gtsam/nonlinear/NonlinearFactorGraph.h>
+#include <gtsam/nonlinear/Values.h>
+
+#include "backend/keyframe_factors.h"
+#include "backend/relative_pose_factor.h"
+#include "backend/revision_report.h"
+
+namespace ignis {
+
+using gtsam::symbol_shorthand::X;
+
+std::vector<LinearisationPoint> linearisation_of(const IncrementalSolver& solver, const SmootherState& state) {
+  const gtsam::Values& values = solver.linearisation_points();
+  std::vector<LinearisationPoint> points;
+  points.reserve(state.nodes.size());
+  for (const GraphNode& node : state.nodes) points.push_back({node.end.id, estimate_of(values, node.end.id)});
+  return points;
+}
+
+std::string restore_solver(RestoredGraph& graph, const BackendConfig& config, IncrementalSolver& solver) {
+  SmootherState& state = graph.state;
+  if (state.nodes.empty()) return {};
+  gtsam::NonlinearFactorGraph factors;
+  gtsam::Values values;
+  for (const GraphNode& node : state.nodes) add_link_factors(node.link, config, factors);
+  for (const GraphLoop& loop : state.loops) {
+    factors.push_back(
+        make_relative_pose_factor(X(loop.result.to_id), X(loop.result.from_id), loop.result.T_to_from, loop.rows));
+  }
+  for (const LinearisationPoint& point : graph.linearised) insert_estimate(point.id, point.state, values);
+  const SolverOutcome outcome = solver.add(factors, values);
+  if (!outcome.accepted) return outcome.reason;
+  const std::size_t first_loop = outcome.factors.size() - state.loops.size();
+  for (std::size_t i = 0; i < state.loops.size(); ++i) state.loops[i].factor = outcome.factors[first_loop + i];
+  refresh_poses(solver, state);
+  return {};
+}
+
+}  // namespace ignis

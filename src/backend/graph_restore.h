@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "backend/graph_change.h"
+#include "backend/incremental_solver.h"
+
+/// Between the solver and the journal.
+namespace ignis {
+
+/// Where the solver has linearised, one per node.
+[[nodiscard]] std::vector<LinearisationPoint> linearisation_of(const IncrementalSolver& solver,
+                                                               const SmootherState& state);
+
+/// Gives a fresh solver all factors of `graph` in one update, linearised where they were, and fills what follows from
+/// it: poses, and the loops' factor ids. The reason when the solver refuses; empty when all is well.
+[[nodiscard]] std::string restore_solver(RestoredGraph& graph, const BackendConfig& config, IncrementalSolver& solver);
+
+}  // namespace ignis

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/keyframe_chain.h"
+
+#include <gtsam/nonlinear/NonlinearFactorGraph.h>
+#include <gtsam/nonlinear/Values.h>
+
+#include <format>
+#include <optional>
+
+#include "backend/information.h"
+#include "backend/keyframe_check.h"
+#include "backend/keyframe_factors.h"
+
+namespace ignis {
+namespace {
+
+/// Why the keyframe's IMU samples cannot link it to the newest node, or nothing.
+std::optional<std::string> imu_obstacle(const Keyframe& keyframe, const LinkEnd& previous, const ImuNoise& noise) {
+  if (keyframe.id != previous.id + 1) return "keyframes are missing before this one";
+  if (!keyframe.imu_complete) return "the front end reports an IMU gap";
+  if (keyframe.previous_utime != previous.utime) return "the interval does not begin at the previous keyframe";
+  return imu_problem(keyframe.imu, previous.utime, keyframe.state.utime, noise);
+}
+
+SolverOutcome insert(const KeyframeLink& link, const BackendConfig& config, IncrementalSolver& solver) {
+  gtsam::NonlinearFactorGraph factors;
+  gtsam::Values values;
+  add_link_factors(link, config, factors);
+  insert_estimate(link.id, link.guess, values);
+  return solver.add(factors, values);
+}
+
+SolverOutcome insert_first(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
+                           GraphNode& node) {
+  node.link = first_link(keyframe, config);
+  return insert(node.link, config, solver);
+}
+
+SolverOutcome insert_next(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
+                          SmootherState& state, GraphNode& node, std::string& left_out) {
+  LinkEnd previous = state.nodes.back().end;
+  previous.estimate = estimate_of(solver.estimate(), previous.id);
+  // The information belongs to the interval since id - 1 and says nothing about a longer one.
+  WhiteningRows odometry(0, 6);
+  if (keyframe.id == previous.id + 1) {
+    odometry = whitening_with_floor(config.scan_information_scale * keyframe.scan_information,
+                                    config.odometry_floor_rad, config.odometry_floor_m);
+  }
+  node.odometry = odometry.rows() > 0 ? odometry : loose_rows(config);
+  const std::optional<std::string> obstacle = imu_obstacle(keyframe, previous, config.imu);
+  node.link = next_link(keyframe, previous, !obstacle, odometry, config);
+  SolverOutcome outcome = insert(node.link, config, solver);
+  if (outcome.accepted && !obstacle) return outcome;
+  left_out = "linked without IMU: " + obstacle.value_or(outcome.reason);
+  if (!obstacle) {
+    node.link = next_link(keyframe, previous, false, odometry, config);
+    outcome = insert(node.link, config, solver);
+  }
+  if (outcome.accepted) ++state.stats.without_imu;
+  return outcome;
+}
+
+}  // namespace
+
+KeyframeVerdict verdict_on(const Keyframe& keyframe, const SmootherState& state, std::string& reason) {
+  if (!state.nodes.empty() && keyframe.session != state.session) {
+    reason = std::format("session {} while the graph holds session {}", keyframe.session, state.session);
+    return KeyframeVerdict::kOtherSession;
+  }
+  if (keyframe.id < state.expected_id) {
+    reason = std::format("duplicate: id {} was handled before", keyframe.id);
+    return KeyframeVerdict::kDuplicate;
+  }
+  if (keyframe.id > state.expected_id) {
+    reason = std::format("gap: expected id {}, got {}", state.expected_id, keyframe.id);
+    return KeyframeVerdict::kGap;
+  }
+  reason = keyframe_problem(keyframe);
+  if (reason.empty() && !state.nodes.empty() && keyframe.state.utime <= state.nodes.back().end.utime) {
+    reason = "the stamp does not come after the previous keyframe's";
+  }
+  return reason.empty() ? KeyframeVerdict::kAccepted : KeyframeVerdict::kInvalid;
+}
+
+bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state) {
+  if (state.nodes.empty() || keyframe.session != state.session) return false;
+  if (const GraphNode* node = state.node_of(keyframe.id)) {
+    return node->end.utime != keyframe.state.utime ||
+           node->end.T_odom_body.translation != keyframe.state.T_odom_body.translation;
+  }
+  const LinkEnd& newest = state.nodes.back().end;
+  return keyframe.id == newest.id + 1 && keyframe.previous_utime != newest.utime;
+}
+
+SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
+                              SmootherState& state, std::string& left_out) {
+  GraphNode node{{keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body, {}}, {}, {}};
+  SolverOutcome outcome = state.nodes.empty() ? insert_first(keyframe, config, solver, node)
+                                              : insert_next(keyframe, config, solver, state, node, left_out);
+  if (!outcome.accepted) return outcome;
+  state.session = keyframe.session;
+  state.expected_id = keyframe.id + 1;
+  state.angular_rate = keyframe.state.angular_rate;
+  state.nodes.push_back(std::move(node));
+  state.clouds.push_back(keyframe.cloud);
+  return outcome;
+}
+
+void count_verdict(KeyframeVerdict verdict, SmootherState& state) {
+  switch (verdict) {
+    case KeyframeVerdict::kDuplicate:
+      ++state.stats.duplicates;
+      break;
+    case KeyframeVerdict::kGap:
+      ++state.stats.gaps;
+      break;
+    case KeyframeVerdict::kInvalid:
+    case KeyframeVerdict::kSolver:
+      ++state.stats.invalid;
+      ++state.expected_id;
+      break;
+    case KeyframeVerdict::kOtherSession:
+    case KeyframeVerdict::kAccepted:
+      break;
+  }
+}
+
+}  // namespace ignis

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/loop_trial.h"
+
+#include <gtsam/inference/Symbol.h>
+#include <gtsam/nonlinear/NonlinearFactorGraph.h>
+#include <gtsam/nonlinear/Values.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "backend/loop_consistency.h"
+#include "backend/relative_pose_factor.h"
+#include "backend/revision_report.h"
+
+namespace ignis {
+namespace {
+
+using gtsam::symbol_shorthand::X;
+
+constexpr int kUpdatesAfterLoop = 2;      // Gauss-Newton steps that follow a large correction
+constexpr std::size_t kMostSuspects = 8;  // whose cost is computed; the others' own error is small
+// A measurement that nothing else checks has leverage 1: its cost cannot be told.
+constexpr double kSmallestFreedom = 1e-6;
+
+struct Suspect {
+  std::size_t index;
+  double share;  ///< own chi-square over its bound
+};
+
+std::vector<Suspect> suspects_of(const BackendConfig& config, IncrementalSolver& solver, const SmootherState& state) {
+  std::vector<Suspect> suspects;
+  for (std::size_t i = 0; i < state.loops.size(); ++i) {
+    const GraphLoop& loop = state.loops[i];
+    const double bound = chi_square_bound(loop.rows.rows(), config.loop_consistency_probability);
+    suspects.push_back({i, 2.0 * solver.half_chi_square(loop.factor) / bound});
+  }
+  std::ranges::stable_sort(suspects, std::ranges::greater(), &Suspect::share);
+  return suspects;
+}
+
+/// By how much the chi-square of the graph would fall without the loop.
+double cost_of(const GraphLoop& loop, const SmootherState& state, const Matrix6d& covariance) {
+  const Pose& T_map_to = state.poses[state.place_of(loop.result.to_id)].T_map_body;
+  const Pose& T_map_from = state.poses[state.place_of(loop.result.from_id)].T_map_body;
+  const Eigen::VectorXd residual = loop.rows * body_difference(loop.result.T_to_from, T_map_to.inverse() * T_map_from);
+  const Eigen::MatrixXd leverage = loop.rows * covariance * loop.rows.transpose();
+  const Eigen::Index n = leverage.rows();
+  const Eigen::MatrixXd freedom = Eigen::MatrixXd::Identity(n, n) * (1.0 + kSmallestFreedom) - leverage;
+  return residual.dot(freedom.ldlt().solve(residual));
+}
+
+}  // namespace
+
+LoopEntry enter_graph(GraphLoop loop, IncrementalSolver& solver, SmootherState& state) {
+  const double before = solver.half_chi_square();
+  gtsam::NonlinearFactorGraph factors;
+  factors.push_back(
+      make_relative_pose_factor(X(loop.result.to_id), X(loop.result.from_id), loop.result.T_to_from, loop.rows));
+  const SolverOutcome outcome = solver.add(factors, {});
+  if (!outcome.accepted) return {false, outcome.reason, 0.0};
+  solver.settle(kUpdatesAfterLoop);
+  loop.factor = outcome.factors.front();
+  loop.entered_id = state.nodes.back().end.id;
+  loop.result.stage = LoopStage::kOnTrial;
+  loop.result.reason = LoopReason::kAccepted;
+  state.loops.push_back(std::move(loop));
+  refresh_poses(solver, state);
+  return {true, {}, 2.0 * (solver.half_chi_square() - before)};
+}
+
+GraphLoop leave_graph(std::size_t index, const std::string& reason_text, IncrementalSolver& solver,
+                      SmootherState& state) {
+  GraphLoop loop = std::move(state.loops[index]);
+  state.loops.erase(state.loops.begin() + static_cast<std::ptrdiff_t>(index));
+  static_cast<void>(solver.remove({&loop.factor, 1}));
+  solver.settle(kUpdatesAfterLoop);
+  refresh_poses(solver, state);
+  loop.result.stage = LoopStage::kWithdrawn;
+  loop.result.reason = LoopReason::kWithdrawn;
+  loop.result.reason_text = reason_text;
+  ++state.stats.loops_withdrawn;
+  return loop;
+}
+
+std::optional<ContradictedLoop> contradicted_loop(double newest_rise, const BackendConfig& config,
+                                                  IncrementalSolver& solver, const SmootherState& state) {
+  if (state.loops.empty()) return std::nullopt;
+  const auto bound_of = [&](std::size_t i) {
+    return chi_square_bound(state.loops[i].rows.rows(), config.loop_consistency_probability);
+  };
+  std::vector<Suspect> suspects = suspects_of(config, solver, state);
+  const std::size_t newest = state.loops.size() - 1;
+  const bool risen = !(newest_rise <= bound_of(newest));
+  if (!risen && suspects.front().share <= 1.0) return std::nullopt;
+  if (suspects.size() > kMostSuspects) suspects.resize(kMostSuspects);
+  if (risen && std::ranges::find(suspects, newest, &Suspect::index) == suspects.end())
+    suspects.push_back({newest, 0.0});
+
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;
+  for (const Suspect& suspect : suspects) {
+    pairs.emplace_back(X(state.loops[suspect.index].result.to_id), X(state.loops[suspect.index].result.from_id));
+  }
+  const std::vector<Matrix6d> covariances = solver.relative_covariances(pairs);
+  ContradictedLoop worst{suspects.front().index, suspects.front().share * bound_of(suspects.front().index),
+                         bound_of(suspects.front().index)};
+  double worst_share = 0.0;
+  for (std::size_t i = 0; i < covariances.size(); ++i) {
+    const std::size_t index = suspects[i].index;
+    const double cost = cost_of(state.loops[index], state, covariances[i]);
+    if (cost / bound_of(index) <= worst_share) continue;
+    worst_share = cost / bound_of(index);
+    worst = {index, cost, bound_of(index)};
+  }
+  // A rise alone may be the settling of what was linearised elsewhere.
+  if (!covariances.empty() && worst_share <= 1.0) return std::nullopt;
+  return worst;
+}
+
+}  // namespace ignis

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "backend/information.h"
+#include "common/pose.h"
+
+namespace ignis {
+
+/// Adjoint of a pose for tangent vectors with the attitude first: T exp(x) = exp(adjoint(T) x) T.
+[[nodiscard]] Matrix6d adjoint(const Pose& pose);
+
+/// What odometry alone says about any two keyframes, in constant time. A step's error, carried to axes that stay, is
+/// independent of the others', so the covariance between two keyframes is a difference of running sums (to first
+/// order). Places are indices of nodes.
+class OdometryChain {
+ public:
+  /// `step_covariance` of the motion since the previous pose, attitude then position, body axes of this pose; the first
+  /// one is ignored.
+  void append(const Pose& T_odom_body, const Matrix6d& step_covariance);
+
+  [[nodiscard]] std::size_t size() const { return poses_.size(); }
+  [[nodiscard]] const Pose& pose(std::size_t place) const { return poses_[place]; }
+
+  [[nodiscard]] Pose T_from_to(std::size_t from, std::size_t to) const;
+
+  /// Of T_from_to, in body axes of `to`; either may be the later one.
+  [[nodiscard]] Matrix6d covariance(std::size_t from, std::size_t to) const;
+
+ private:
+  std::vector<Pose> poses_;
+  std::vector<Matrix6d> sums_;  ///< of all steps so far, in axes of odom
+};
+
+/// Covariance of a relative pose that `rows` whiten. `background` is a full-rank information that every direction has
+/// besides: it decides where the rows say nothing, and must be negligible where they do.
+[[nodiscard]] Matrix6d covariance_of(const WhiteningRows& rows, const Matrix6d& background);
+
+}  // namespace ignis

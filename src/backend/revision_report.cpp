@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/revision_report.h"
+
+#include <gtsam/inference/Symbol.h>
+#include <gtsam/nonlinear/Values.h>
+
+#include "backend/keyframe_factors.h"
+
+namespace ignis {
+namespace {
+
+using gtsam::symbol_shorthand::X;
+
+constexpr double kMovedPosition = 1e-4;  // [m]
+constexpr double kMovedRotation = 1e-5;  // [rad]
+
+bool has_moved(const Pose& a, const Pose& b) {
+  const Vector6d d = body_difference(a, b);
+  return d.head<3>().norm() > kMovedRotation || d.tail<3>().norm() > kMovedPosition;
+}
+
+void list_moved(SmootherState& state, SmootherUpdate& update) {
+  for (std::size_t i = 0; i < state.poses.size(); ++i) {
+    const bool is_new = i >= state.published.size();
+    if (!is_new && !has_moved(state.published[i], state.poses[i].T_map_body)) continue;
+    if (is_new) state.published.emplace_back();
+    state.published[i] = state.poses[i].T_map_body;
+    update.moved.push_back(state.poses[i]);
+  }
+}
+
+}  // namespace
+
+void refresh_poses(IncrementalSolver& solver, SmootherState& state) {
+  state.poses.clear();
+  for (const GraphNode& node : state.nodes) {
+    state.poses.push_back({node.end.id, estimate_of(solver.estimate(), node.end.id).T_odom_body});
+  }
+}
+
+Pose T_map_odom(const SmootherState& state) {
+  if (state.nodes.empty()) return {};
+  return state.poses.back().T_map_body * state.nodes.back().end.T_odom_body.inverse();
+}
+
+void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUpdate& update) {
+  update.revision = state.revision;
+  update.expected_id = state.expected_id;
+  update.T_map_odom = T_map_odom(state);
+  if (state.nodes.empty()) return;
+  const LinkEnd& end = state.nodes.back().end;
+  update.newest = estimate_of(solver.estimate(), end.id);
+  update.newest.utime = end.utime;
+  update.newest.angular_rate = state.angular_rate;
+  if (!update.accepted()) return;
+  if (const auto covariance = solver.marginal_covariance(X(end.id))) {
+    update.covariance = *covariance;
+    update.covariance_valid = true;
+  }
+  list_moved(state, update);
+}
+
+PoseGraph exported_graph(const SmootherState& state) {
+  PoseGraph graph;
+  graph.vertices = state.poses;
+  for (std::size_t i = 1; i < state.nodes.size(); ++i) {
+    const WhiteningRows& rows = state.nodes[i].odometry;
+    const Pose T_from_to = state.nodes[i - 1].end.T_odom_body.inverse() * state.nodes[i].end.T_odom_body;
+    graph.edges.push_back(
+        {state.nodes[i - 1].end.id, state.nodes[i].end.id, T_from_to, rows.transpose() * rows, false});
+  }
+  for (const GraphLoop& loop : state.loops) {
+    graph.edges.push_back(
+        {loop.result.to_id, loop.result.from_id, loop.result.T_to_from, loop.rows.transpose() * loop.rows, true});
+  }
+  return graph;
+}
+
+}  // namespace ignis

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "backend/incremental_solver.h"
+#include "backend/smoother_state.h"
+
+/// What a call of the smoother tells the outside of the graph.
+namespace ignis {
+
+/// Reads the poses of all nodes from the solver.
+void refresh_poses(IncrementalSolver& solver, SmootherState& state);
+
+/// Takes odom to map at the newest node; the identity while there is none.
+[[nodiscard]] Pose T_map_odom(const SmootherState& state);
+
+/// Fills revision, newest state and covariance of `update`, and lists what moved since it was last listed.
+void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUpdate& update);
+
+/// Poses, odometry and loops for keyframes.g2o.
+[[nodiscard]] PoseGraph exported_graph(const SmootherState& state);
+
+}  // namespace ignis

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/shadow_optimum.h"
+
+#include <gtsam/geometry/Pose3.h>
+#include <gtsam/inference/Symbol.h>
+#include <gtsam/navigation/ImuBias.h>
+#include <gtsam/nonlinear/LevenbergMarquardtOptimizer.h>
+#include <gtsam/nonlinear/NonlinearFactorGraph.h>
+#include <gtsam/nonlinear/Values.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "backend/gtsam_conversion.h"
+#include "backend/revision_report.h"
+#include "backend/shadow_graph.h"
+
+namespace ignis {
+
+using gtsam::symbol_shorthand::B;
+using gtsam::symbol_shorthand::V;
+using gtsam::symbol_shorthand::X;
+
+struct ShadowProblem::Graph {
+  gtsam::NonlinearFactorGraph factors;
+  gtsam::Values estimate;
+  std::vector<std::int32_t> ids;  ///< of the keyframes, ascending
+  std::int32_t revision = 0;
+};
+
+struct ShadowOptimum::Solution {
+  gtsam::Values values;
+};
+
+namespace {
+
+gtsam::LevenbergMarquardtParams parameters() {
+  gtsam::LevenbergMarquardtParams params;
+  params.setRelativeErrorTol(1e-10);
+  params.setAbsoluteErrorTol(1e-8);
+  params.setMaxIterations(100);
+  return params;
+}
+
+void measure_gap(const ShadowProblem::Graph& graph, const gtsam::Values& optimum, ShadowOptimum& result) {
+  for (const std::int32_t id : graph.ids) {
+    const Vector6d gap = body_difference(from_gtsam(graph.estimate.at<gtsam::Pose3>(X(id))),
+                                         from_gtsam(optimum.at<gtsam::Pose3>(X(id))));
+    result.largest_gap_rad = std::max(result.largest_gap_rad, gap.head<3>().norm());
+    result.largest_gap_m = std::max(result.largest_gap_m, gap.tail<3>().norm());
+  }
+}
+
+/// The optimum as a starting point for the graph as it is by now: keyframes that came later keep their motion relative
+/// to the newest one that was solved. Nothing when the optimum holds keyframes that this graph does not.
+std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optimum, IncrementalSolver& solver,
+                                            const SmootherState& state) {
+  const gtsam::Values& solved = optimum.values;
+  const gtsam::Values& now = solver.estimate();
+  gtsam::Values values;
+  gtsam::Pose3 T_new_old;
+  std::size_t carried = 0;
+  for (const GraphNode& node : state.nodes) {
+    const std::int32_t id = node.end.id;
+    const auto before = now.at<gtsam::Pose3>(X(id));
+    if (solved.exists(X(id))) {
+      T_new_old = solved.at<gtsam::Pose3>(X(id)) * before.inverse();
+      values.insert(X(id), solved.at<gtsam::Pose3>(X(id)));
+      values.insert(V(id), solved.at<gtsam::Vector3>(V(id)));
+      values.insert(B(id), solved.at<gtsam::imuBias::ConstantBias>(B(id)));
+      carried += 3;
+    } else {
+      values.insert(X(id), T_new_old * before);
+      values.insert(V(id), gtsam::Vector3(T_new_old.rotation().matrix() * now.at<gtsam::Vector3>(V(id))));
+      values.insert(B(id), now.at<gtsam::imuBias::ConstantBias>(B(id)));
+    }
+  }
+  if (carried != solved.size()) return std::nullopt;
+  return values;
+}
+
+}  // namespace
+
+ShadowOptimum solve(const ShadowProblem& problem) {
+  ShadowOptimum result;
+  if (!problem.graph || problem.graph->ids.empty()) return result;
+  const ShadowProblem::Graph& graph = *problem.graph;
+  result.revision = graph.revision;
+  result.keyframes = static_cast<int>(graph.ids.size());
+  try {
+    gtsam::LevenbergMarquardtOptimizer optimizer(graph.factors, graph.estimate, parameters());
+    result.half_chi_square_before = optimizer.error();
+    auto solution = std::make_shared<ShadowOptimum::Solution>();
+    solution->values = optimizer.optimize();
+    result.half_chi_square = optimizer.error();
+    measure_gap(graph, solution->values, result);
+    result.solved = std::isfinite(result.half_chi_square) && std::isfinite(result.largest_gap_m) &&
+                    std::isfinite(result.largest_gap_rad) && result.half_chi_square <= result.half_chi_square_before;
+    result.solution = std::move(solution);
+  } catch (const std::exception&) {
+    // A check that fails leaves the graph as it is.
+    result.solved = false;
+  }
+  return result;
+}
+
+ShadowProblem shadow_problem(IncrementalSolver& solver, const SmootherState& state) {
+  auto graph = std::make_shared<ShadowProblem::Graph>();
+  graph->factors = solver.living_factors();
+  graph->estimate = solver.estimate();
+  for (const GraphNode& node : state.nodes) graph->ids.push_back(node.end.id);
+  graph->revision = state.revision;
+  return {std::move(graph)};
+}
+
+bool take_over(const ShadowOptimum& optimum, const BackendConfig& config, IncrementalSolver& solver,
+               SmootherState& state) {
+  if (!optimum.solved) return false;
+  const std::optional<gtsam::Values> values = carried_to_now(*optimum.solution, solver, state);
+  if (!values) return false;
+  ++state.stats.shadow_checks;
+  state.stats.shadow_gap_m = optimum.largest_gap_m;
+  state.stats.shadow_gap_rad = optimum.largest_gap_rad;
+  if (optimum.largest_gap_m <= config.shadow_swap_m && optimum.largest_gap_rad <= config.shadow_swap_rad) return false;
+  if (!solver.restart_at(*values)) return false;
+  ++state.stats.shadow_swaps;
+  refresh_poses(solver, state);
+  return true;
+}
+
+}  // namespace ignis

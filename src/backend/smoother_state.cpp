@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/smoother_state.h"
+
+#include <algorithm>
+
+namespace ignis {
+
+const GraphNode* SmootherState::node_of(std::int32_t id) const {
+  const auto found = std::ranges::lower_bound(nodes, id, {}, [](const GraphNode& node) { return node.end.id; });
+  return found != nodes.end() && found->end.id == id ? &*found : nullptr;
+}
+
+std::size_t SmootherState::place_of(std::int32_t id) const {
+  return static_cast<std::size_t>(node_of(id) - nodes.data());
+}
+
+void follow_nodes(SmootherState& state, const BackendConfig& config) {
+  const WhiteningRows loose = loose_rows(config);
+  const Matrix6d background = loose.transpose() * loose;
+  for (std::size_t i = state.odometry.size(); i < state.nodes.size(); ++i) {
+    const GraphNode& node = state.nodes[i];
+    state.odometry.append(node.end.T_odom_body, covariance_of(node.odometry, background));
+  }
+  for (std::size_t i = 0; i < state.poses.size(); ++i) state.places.place(i, state.poses[i].T_map_body.translation);
+}
+
+}  // namespace ignis

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "backend/information.h"
+#include "backend/keyframe_factors.h"
+#include "backend/keyframe_pose.h"
+#include "backend/loop_result.h"
+#include "backend/odometry_chain.h"
+#include "backend/place_index.h"
+#include "backend/smoother.h"
+
+namespace ignis {
+
+/// A keyframe in the graph.
+struct GraphNode {
+  LinkEnd end;
+  WhiteningRows odometry;  ///< of the link to the previous node, for the exported graph
+  KeyframeLink link;       ///< what its factors are made of
+};
+
+/// A loop that the match has verified.
+struct GraphLoop {
+  LoopResult result;    ///< with stage, reason and figures as last published
+  FactorId factor = 0;  ///< while it is in the graph
+  WhiteningRows rows;
+  std::int32_t number = 0;       ///< 0, 1, 2 ... in the order of their arrival
+  std::int32_t entered_id = -1;  ///< newest keyframe when it entered the graph
+};
+
+/// A pair of keyframes that must not be closed.
+struct LoopVeto {
+  std::int32_t from_id = 0;
+  std::int32_t to_id = 0;
+};
+
+/// All that the smoother knows besides the solver's factors and values. Plain data; the functions that change it stand
+/// in keyframe_chain.h, loop_*.h and revision_report.h. The vectors of one element per node share their indices.
+struct SmootherState {
+  std::vector<GraphNode> nodes;
+  std::vector<std::vector<CloudPoint>> clouds;  ///< body frame, one per node
+  std::vector<KeyframePose> poses;              ///< as the graph places them, one per node
+  std::vector<Pose> published;                  ///< as last listed in an update
+  std::vector<GraphLoop> loops;                 ///< in the graph
+  std::vector<GraphLoop> waiting;               ///< verified, but outside of it
+  std::vector<LoopVeto> vetoes;
+  SmootherStats stats;
+  Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
+  std::int32_t session = 0;
+  std::int32_t expected_id = 0;
+  std::int32_t last_loop_id = -1;
+  std::int32_t next_loop_number = 0;
+  std::int32_t revision = 0;
+
+  // What follows from the above; brought up to date by follow_nodes().
+  PlaceIndex places{kPlaceCell};
+  OdometryChain odometry;
+  std::unordered_map<std::uint64_t, bool> agreement;  ///< of pairs of loop numbers that were compared
+
+  static constexpr double kPlaceCell = 8.0;  // [m] about the radius of the candidate test
+
+  [[nodiscard]] const GraphNode* node_of(std::int32_t id) const;
+  /// Index of a keyframe that the graph holds.
+  [[nodiscard]] std::size_t place_of(std::int32_t id) const;
+};
+
+/// Brings what follows from nodes and poses up to date.
+void follow_nodes(SmootherState& state, const BackendConfig& config);
+
+}  // namespace ignis

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <random>
+
+#include "backend/graph_change.h"
+#include "backend/smoother.h"
+#include "backend/synthetic_drive.h"
+#include "backend/text_contains.h"
+#include "common/so3.h"
+
+/// A smoother out of its journal is the smoother that wrote it.
+namespace ignis {
+namespace {
+
+using Records = std::vector<std::vector<std::byte>>;
+
+constexpr double kSamePosition = 1e-6;  // [m]
+
+/// One thing that happens to a smoother.
+struct Step {
+  const Keyframe* keyframe = nullptr;
+  std::int32_t gap_before = -1;
+  std::optional<LoopMeasurement> loop;
+};
+
+void take(Smoother& smoother, const Step& step) {
+  if (step.gap_before >= 0) smoother.accept_gap_before(step.gap_before);
+  if (step.keyframe != nullptr) static_cast<void>(smoother.add_keyframe(*step.keyframe));
+  if (step.loop) static_cast<void>(smoother.add_loop(*step.loop));
+}
+
+SmootherRestoration restored(const Records& records, const BackendConfig& config = {}) {
+  const std::vector<std::span<const std::byte>> spans(records.begin(), records.end());
+  return restore_smoother(config, LoopGates(), spans);
+}
+
+LoopMeasurement random_loop(const testing::Drive& drive, int newest, bool is_true, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  LoopMeasurement loop;
+  loop.from_id = newest - static_cast<int>(random() % 3);
+  loop.to_id = static_cast<int>(random() % static_cast<unsigned>(loop.from_id - 8));
+  const auto at = [&](std::int32_t id) { return drive.T_world_body[static_cast<std::size_t>(id)]; };
+  Pose error;
+  const double size = is_true ? 1.0 : 100.0;
+  error.rotation = so3::exp(0.003 * size * Eigen::Vector3d(normal(random), normal(random), normal(random)));
+  error.translation = 0.02 * size * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  loop.T_to_from = at(loop.to_id).inverse() * at(loop.from_id) * error;
+  Vector6d information;
+  information << Eigen::Vector3d::Constant(1.0 / (0.003 * 0.003)), Eigen::Vector3d::Constant(1.0 / (0.02 * 0.02));
+  loop.information = information.asDiagonal();
+  return loop;
+}
+
+/// Keyframes with some left out, with loops true and false in between.
+std::vector<Step> random_steps(const testing::Drive& drive, std::mt19937& random) {
+  std::vector<Step> steps;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    if (keyframe.id > 2 && random() % 15 == 0) {
+      steps.push_back({.keyframe = nullptr, .gap_before = keyframe.id + 1, .loop = {}});
+      continue;
+    }
+    steps.push_back({.keyframe = &keyframe, .gap_before = -1, .loop = {}});
+    if (keyframe.id < 12 || random() % 4 != 0) continue;
+    const bool is_true = random() % 3 != 0;
+    steps.push_back({.keyframe = nullptr, .gap_before = -1, .loop = random_loop(drive, keyframe.id, is_true, random)});
+  }
+  return steps;
+}
+
+void expect_same(const Smoother& a, const Smoother& b) {
+  EXPECT_EQ(a.revision(), b.revision());
+  EXPECT_EQ(a.expected_id(), b.expected_id());
+  EXPECT_EQ(a.stats().loops_kept, b.stats().loops_kept);
+  EXPECT_EQ(a.stats().loops_withdrawn, b.stats().loops_withdrawn);
+  EXPECT_EQ(a.stats().without_imu, b.stats().without_imu);
+  ASSERT_EQ(a.all_poses().size(), b.all_poses().size());
+  for (std::size_t i = 0; i < a.all_poses().size(); ++i) {
+    const Vector6d difference = body_difference(a.all_poses()[i].T_map_body, b.all_poses()[i].T_map_body);
+    ASSERT_EQ(a.all_poses()[i].id, b.all_poses()[i].id);
+    ASSERT_LT(difference.tail<3>().norm(), kSamePosition) << "keyframe " << a.all_poses()[i].id;
+  }
+  const PoseGraph graph = a.pose_graph();
+  const PoseGraph other = b.pose_graph();
+  ASSERT_EQ(graph.edges.size(), other.edges.size());
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    EXPECT_EQ(graph.edges[i].from, other.edges[i].from);
+    EXPECT_EQ(graph.edges[i].to, other.edges[i].to);
+    EXPECT_EQ(graph.edges[i].is_loop, other.edges[i].is_loop);
+    // Where a matrix begins in memory decides how its product is rounded.
+    EXPECT_TRUE(graph.edges[i].information.isApprox(other.edges[i].information, 1e-12));
+  }
+}
+
+class SmootherJournal : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(SmootherJournal, KilledAnywhereEndsWithTheSameGraph) {
+  std::mt19937 random(GetParam());
+  const testing::Drive drive = testing::make_drive({.seed = GetParam(), .keyframes = 60, .cloud_points = 0});
+  const std::vector<Step> steps = random_steps(drive, random);
+  Smoother uninterrupted{BackendConfig(), LoopGates()};
+  Smoother killed{BackendConfig(), LoopGates()};
+  Records records;
+  int kills = 0;
+  for (const Step& step : steps) {
+    take(uninterrupted, step);
+    take(killed, step);
+    records.push_back(killed.take_change());
+    if (random() % 8 != 0) continue;
+    SmootherRestoration restoration = restored(records);
+    EXPECT_EQ(restoration.problem, "");
+    EXPECT_EQ(restoration.records_used, records.size());
+    expect_same(killed, restoration.smoother);
+    killed = std::move(restoration.smoother);
+    ++kills;
+  }
+  EXPECT_GE(kills, 3);
+  EXPECT_GE(uninterrupted.stats().loops_kept, 3);
+  expect_same(uninterrupted, killed);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, SmootherJournal, ::testing::Range(1U, 13U));
+
+TEST(SmootherJournalSearch, FindsTheSameLoopsAfterwards) {
+  const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 45, .cloud_points = 3000});
+  Smoother uninterrupted{BackendConfig(), LoopGates()};
+  Smoother killed{BackendConfig(), LoopGates()};
+  Records records;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(uninterrupted.add_keyframe(keyframe));
+    static_cast<void>(killed.add_keyframe(keyframe));
+    records.push_back(killed.take_change());
+    if (keyframe.id % 9 == 5) killed = restored(records).smoother;
+  }
+  EXPECT_GE(uninterrupted.stats().loops_kept, 3);
+  expect_same(uninterrupted, killed);
+}
+
+TEST(SmootherJournalRecords, NothingAtAllIsAnEmptyGraph) {
+  const SmootherRestoration restoration = restored({});
+  EXPECT_EQ(restoration.problem, "");
+  EXPECT_EQ(restoration.smoother.expected_id(), 0);
+}
+
+TEST(SmootherJournalRecords, TheFirstThatDoesNotFitEndsItAndIsNamed) {
+  const testing::Drive drive = testing::make_drive({.seed = 3, .keyframes = 6});
+  Smoother smoother{BackendConfig(), LoopGates()};
+  Records records;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(smoother.add_keyframe(keyframe));
+    records.push_back(smoother.take_change());
+  }
+  Records hole = records;
+  hole.erase(hole.begin() + 3);
+  const SmootherRestoration restoration = restored(hole);
+  EXPECT_EQ(restoration.records_used, 3U);
+  EXPECT_TRUE(testing::contains(restoration.problem, "keyframe 4 is not linked"));
+  EXPECT_EQ(restoration.smoother.expected_id(), 3);
+  Records cut = records;
+  cut[2].pop_back();
+  EXPECT_EQ(restored(cut).records_used, 2U);
+  EXPECT_TRUE(testing::contains(restored(cut).problem, "no change of a graph"));
+}
+
+TEST(SmootherJournalRecords, HoldWhatChangedAndNothingElse) {
+  const testing::Drive drive = testing::make_drive({.seed = 4, .keyframes = 50});
+  BackendConfig config;
+  config.use_loop_closing = false;
+  Smoother smoother(config, LoopGates());
+  std::vector<std::size_t> sizes;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(smoother.add_keyframe(keyframe));
+    sizes.push_back(smoother.take_change().size());
+  }
+  EXPECT_LT(sizes.back(), 12'000U) << "bytes of the last of 50 keyframes without a cloud";
+  EXPECT_LT(smoother.take_change().size(), 200U) << "when nothing has happened";
+}
+
+TEST(SmootherJournalRecords, SixHundredKeyframesAreBackWithinTwoSeconds) {
+  const testing::Drive drive = testing::make_drive({.seed = 5, .keyframes = 600});
+  BackendConfig config;
+  config.use_loop_closing = false;
+  Smoother smoother(config, LoopGates());
+  Records records;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(smoother.add_keyframe(keyframe));
+    records.push_back(smoother.take_change());
+  }
+  const auto began = std::chrono::steady_clock::now();
+  const SmootherRestoration restoration = restored(records, config);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
+  RecordProperty("seconds", std::to_string(spent.count()));
+  EXPECT_LT(spent.count(), 2.0);
+  expect_same(smoother, restoration.smoother);
+}
+
+}  // namespace
+}  // namespace ignis

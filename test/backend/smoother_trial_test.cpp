@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "backend/smoother.h"
+#include "backend/synthetic_drive.h"
+
+/// The life of loops that were found elsewhere: waiting, on trial, kept, withdrawn, vetoed.
+namespace ignis {
+namespace {
+
+Matrix6d information(double sigma_rad, double sigma_m) {
+  Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad)),
+      Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m));
+  return diagonal.asDiagonal();
+}
+
+BackendConfig without_search() {
+  BackendConfig config;
+  config.use_loop_closing = false;
+  config.loop_support_beyond_m = 1000.0;
+  config.loop_drift_scale = 1.0;  // the synthetic odometry has no correlated errors
+  return config;
+}
+
+/// A drive whose odometry is vague enough to swallow a lie of metres, and its graph.
+struct VagueDrive {
+  explicit VagueDrive(const BackendConfig& config = without_search(), int keyframes = 30)
+      : drive(testing::make_drive(
+            {.seed = 4, .keyframes = 45, .accel_noise = 2.0, .odometry_sigma_m = 0.15, .odometry_sigma_rad = 0.005})),
+        smoother(noisy(config), LoopGates()) {
+    add_keyframes(keyframes);
+  }
+
+  static BackendConfig noisy(BackendConfig config) {
+    config.imu.accel_noise = 2.0;
+    return config;
+  }
+
+  std::vector<LoopResult> add_keyframes(int count) {
+    std::vector<LoopResult> changed;
+    for (int i = 0; i < count; ++i) {
+      const SmootherUpdate update = smoother.add_keyframe(drive.keyframes[next++]);
+      EXPECT_TRUE(update.accepted()) << update.reason;
+      changed.insert(changed.end(), update.changed.begin(), update.changed.end());
+    }
+    return changed;
+  }
+
+  /// A loop that is wrong by `wrong_m` to the side.
+  SmootherUpdate add_loop(int from, int to, double wrong_m) {
+    Vector6d lie = Vector6d::Zero();
+    lie(3) = wrong_m;
+    const Pose T_true =
+        drive.T_world_body[static_cast<std::size_t>(to)].inverse() * drive.T_world_body[static_cast<std::size_t>(from)];
+    return smoother.add_loop({from, to, perturbed_in_body(T_true, lie), information(0.003, 0.02)});
+  }
+
+  [[nodiscard]] std::vector<Pose> poses() const {
+    std::vector<Pose> poses;
+    for (const KeyframePose& pose : smoother.all_poses()) poses.push_back(pose.T_map_body);
+    return poses;
+  }
+
+  testing::Drive drive;
+  Smoother smoother;
+  std::size_t next = 0;
+};
+
+TEST(LoopTrial, AWrongLoopThatCameFirstGivesWayToTrueOnes) {
+  VagueDrive run;
+  const SmootherUpdate first = run.add_loop(24, 2, 1.6);
+  ASSERT_TRUE(first.loop->accepted()) << "nobody knows better yet, but: " << first.loop->reason_text;
+  std::vector<LoopResult> changed;
+  for (int i = 0; i < 3; ++i) {
+    const SmootherUpdate update = run.add_loop(25 + i, 3 + i, 0.0);
+    changed.insert(changed.end(), update.changed.begin(), update.changed.end());
+    if (update.loop->accepted()) continue;
+    EXPECT_EQ(update.loop->reason, LoopReason::kContradictsLoops);
+    EXPECT_EQ(update.loop->stage, LoopStage::kVerified);
+    EXPECT_EQ(i, 0) << "two that agree outweigh one";
+  }
+  const auto withdrawn = std::ranges::find(changed, LoopReason::kWithdrawn, &LoopResult::reason);
+  ASSERT_NE(withdrawn, changed.end());
+  EXPECT_EQ(withdrawn->from_id, 24);
+  EXPECT_EQ(std::ranges::count(changed, LoopReason::kWithdrawn, &LoopResult::reason), 1);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 3);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 1);
+  const Pose T_to_from = run.poses()[4].inverse() * run.poses()[26];
+  EXPECT_LT(
+      body_difference(run.drive.T_world_body[4].inverse() * run.drive.T_world_body[26], T_to_from).tail<3>().norm(),
+      0.05);
+}
+
+TEST(LoopTrial, AWrongLoopAmongTrueOnesWaitsOutside) {
+  VagueDrive run;
+  for (int i = 1; i < 4; ++i) ASSERT_TRUE(run.add_loop(24 + i, 2 + i, 0.0).loop->accepted());
+  const auto before = run.poses();
+  const SmootherUpdate update = run.add_loop(24, 2, 1.6);
+  EXPECT_EQ(update.loop->reason, LoopReason::kContradictsLoops);
+  EXPECT_TRUE(update.changed.empty());
+  EXPECT_EQ(run.smoother.stats().loops_kept, 3);
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(run.poses()[i].translation, before[i].translation);
+}
+
+TEST(LoopTrial, WaitsForASecondWitnessWhereOdometryIsVague) {
+  BackendConfig config = without_search();
+  config.loop_support_beyond_m = 0.5;
+  VagueDrive run(config);
+  const SmootherUpdate first = run.add_loop(24, 2, 0.0);
+  EXPECT_EQ(first.loop->reason, LoopReason::kNeedsSupport);
+  EXPECT_EQ(first.loop->stage, LoopStage::kVerified);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 0);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 1);
+  const SmootherUpdate second = run.add_loop(25, 3, 0.0);
+  EXPECT_TRUE(second.loop->accepted()) << second.loop->reason_text;
+  ASSERT_EQ(second.changed.size(), 1U);
+  EXPECT_TRUE(second.changed[0].accepted());
+  EXPECT_EQ(second.changed[0].from_id, 24);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 2);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 0);
+}
+
+TEST(LoopTrial, IsOverAfterSomeKeyframesWithoutContradiction) {
+  BackendConfig config = without_search();
+  config.loop_trial_keyframes = 4;
+  VagueDrive run(config);
+  const SmootherUpdate update = run.add_loop(24, 2, 0.0);
+  EXPECT_EQ(update.loop->stage, LoopStage::kOnTrial);
+  EXPECT_EQ(run.smoother.stats().loops_on_trial, 1);
+  EXPECT_TRUE(run.add_keyframes(3).empty());
+  const std::vector<LoopResult> changed = run.add_keyframes(1);
+  ASSERT_EQ(changed.size(), 1U);
+  EXPECT_EQ(changed[0].stage, LoopStage::kKept);
+  EXPECT_EQ(changed[0].reason, LoopReason::kKept);
+  EXPECT_FALSE(changed[0].accepted());
+  EXPECT_EQ(run.smoother.stats().loops_on_trial, 0);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 1);
+  EXPECT_TRUE(run.add_keyframes(3).empty()) << "once";
+}
+
+TEST(LoopTrial, EndsByCommand) {
+  VagueDrive run;
+  const auto before = run.poses();
+  ASSERT_TRUE(run.add_loop(24, 2, 0.0).loop->accepted());
+  EXPECT_TRUE(run.smoother.withdraw_loop(24, 3).changed.empty()) << "another pair";
+  const std::int32_t revision = run.smoother.revision();
+  const SmootherUpdate update = run.smoother.withdraw_loop(24, 2);
+  ASSERT_EQ(update.changed.size(), 1U);
+  EXPECT_EQ(update.changed[0].reason, LoopReason::kWithdrawn);
+  EXPECT_EQ(update.changed[0].stage, LoopStage::kWithdrawn);
+  EXPECT_EQ(update.revision, revision + 1);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 0);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_LT((run.poses()[i].translation - before[i].translation).norm(), 0.02);
+  }
+  EXPECT_TRUE(run.add_loop(24, 2, 0.0).loop->accepted()) << "withdrawn is not forbidden";
+}
+
+TEST(LoopTrial, NeverBeginsForAVetoedPairAndItsNeighbours) {
+  VagueDrive run;
+  ASSERT_TRUE(run.add_loop(24, 2, 0.0).loop->accepted());
+  EXPECT_EQ(run.smoother.veto_loop(24, 2).changed.size(), 1U);
+  for (const auto& [from, to] : {std::pair{24, 2}, {25, 3}, {22, 4}, {26, 0}}) {
+    const SmootherUpdate update = run.add_loop(from, to, 0.0);
+    EXPECT_EQ(update.loop->reason, LoopReason::kVetoed) << from << " " << to;
+  }
+  EXPECT_TRUE(run.add_loop(27, 2, 0.0).loop->accepted());
+  EXPECT_TRUE(run.add_loop(24, 5, 0.0).loop->accepted());
+}
+
+TEST(LoopSearch, LeavesVetoedNeighbourhoodsAlone) {
+  const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 24, .cloud_points = 3000});
+  Smoother free{BackendConfig(), LoopGates()};
+  Smoother forbidden{BackendConfig(), LoopGates()};
+  for (int from = 10; from < 24; ++from) {
+    for (int to = 0; to < 24; ++to) static_cast<void>(forbidden.veto_loop(from, to));
+  }
+  LoopResult last;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(free.add_keyframe(keyframe));
+    last = *forbidden.add_keyframe(keyframe).loop;
+  }
+  EXPECT_GE(free.stats().loops_kept, 1);
+  EXPECT_EQ(forbidden.stats().loops_kept, 0);
+  EXPECT_EQ(last.reason, LoopReason::kVetoed);
+}
+
+TEST(LoopSearch, BoundsTheCorrectionByDistanceOrByCovariance) {
+  const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 24, .cloud_points = 4000});
+  LoopGates gates;
+  gates.loop_max_correction_m = 0.01;
+  const auto reasons = [&](const char* gate) {
+    BackendConfig config;
+    config.loop_correction_gate = gate;
+    Smoother smoother(config, gates);
+    std::vector<LoopReason> all;
+    for (const Keyframe& keyframe : drive.keyframes) all.push_back(smoother.add_keyframe(keyframe).loop->reason);
+    return all;
+  };
+  const std::vector<LoopReason> by_distance = reasons("distance");
+  EXPECT_GE(std::ranges::count(by_distance, LoopReason::kCorrectionTooLarge), 1);
+  EXPECT_EQ(std::ranges::count(by_distance, LoopReason::kAccepted), 0);
+  const std::vector<LoopReason> by_covariance = reasons("covariance");
+  EXPECT_EQ(std::ranges::count(by_covariance, LoopReason::kCorrectionTooLarge), 0);
+  EXPECT_GE(std::ranges::count(by_covariance, LoopReason::kAccepted), 1);
+}
+
+TEST(LoopSearch, ClosesNoHundredLoopsWhileTheVehicleIsParked) {
+  testing::Drive drive = testing::make_drive({.keyframes = 60, .speed = 0.0, .turn_rate = 1e-9, .cloud_points = 4000});
+  Smoother smoother{BackendConfig(), LoopGates()};
+  int searched = 0;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    const SmootherUpdate update = smoother.add_keyframe(keyframe);
+    if (update.loop->candidates > 0) ++searched;
+  }
+  EXPECT_GE(smoother.stats().loops_kept, 1);
+  EXPECT_LE(smoother.stats().loops_kept, 2);
+  EXPECT_LE(searched, 4);
+}
+
+}  // namespace
+}  // namespace ignis

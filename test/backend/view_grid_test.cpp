@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/view_grid.h"
+
+#include <gtest/gtest.h>
+
+namespace ignis {
+namespace {
+
+constexpr double kCell = 0.05;  // [rad]
+
+TEST(ViewGrid, ShowsWhatStandsInFrontOfTheNearestPointAndHidesWhatIsBehind) {
+  const std::vector<Eigen::Vector3d> points = {{0.0, 0.0, -5.0}, {0.0, 0.0, -9.0}, {3.0, 1.0, 2.0}};
+  const ViewGrid view(points, kCell);
+  EXPECT_TRUE(view.would_show({0.0, 0.0, -2.0}, 0.3));
+  EXPECT_TRUE(view.would_show({0.0, 0.0, -5.2}, 0.3));
+  EXPECT_FALSE(view.would_show({0.0, 0.0, -5.4}, 0.3));
+  EXPECT_FALSE(view.would_show({0.0, 0.0, -8.9}, 0.3)) << "hidden behind the nearer one";
+  EXPECT_TRUE(view.would_show({1.5, 0.5, 1.0}, 0.3));
+}
+
+TEST(ViewGrid, ShowsNothingWhereNobodyLooked) {
+  const std::vector<Eigen::Vector3d> points = {{0.0, 0.0, -5.0}};
+  const ViewGrid view(points, kCell);
+  EXPECT_FALSE(view.would_show({0.0, 0.0, 5.0}, 0.3));
+  EXPECT_FALSE(view.would_show({0.0, 2.0, -4.0}, 0.3));
+  EXPECT_FALSE(view.would_show({2.0, 0.0, -4.0}, 0.3));
+}
+
+TEST(ViewGrid, CoversEveryDirection) {
+  for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.0, 3.0, 0.0), Eigen::Vector3d(0.0, -3.0, 0.0),
+                                   Eigen::Vector3d(-1e-9, 0.0, -3.0), Eigen::Vector3d(0.0, 0.0, 0.0)}) {
+    const std::vector<Eigen::Vector3d> points = {p};
+    EXPECT_TRUE(ViewGrid(points, kCell).would_show(p, 0.1));
+  }
+}
+
+}  // namespace
+}  // namespace ignis

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The back end's journal on disk, and commands to its graph, with the real process."""
+
+import contextlib
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from ignis_lcm.ignis import graph_command_t
+
+from ignis import graph
+from ignis.pipeline import Pipeline
+from keyframe_source import BUS, BackendRun, record_keyframes
+
+CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
+CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
+SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
+JOURNAL = "graph_backend.journal"
+INTERVAL = 0.15  # [s] between keyframes
+
+
+@pytest.fixture(scope="module")
+def keyframes(private_network, tmp_path_factory: pytest.TempPathFactory) -> list[list[bytes]]:
+    """The beginning of a drive."""
+    return record_keyframes(tmp_path_factory.mktemp("recording"), SCENE, CONFIG, 25.0)
+
+
+def first_words(folder: Path, config: Path, *arguments: object, seconds: float = 2.0) -> str:
+    """What a back end says in its first seconds."""
+    with Pipeline(folder, BUS) as pipeline:
+        process = pipeline.start("graph_backend", "--config", config, "--journal", folder / "journal", *arguments)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(seconds)
+        return pipeline.last_words("graph_backend")
+
+
+def test_journal_of_another_configuration_is_kept_but_not_used(keyframes: list[list[bytes]], tmp_path: Path) -> None:
+    BackendRun(tmp_path, CONFIG, keyframes, 0.0, 1).drive(INTERVAL)
+    assert f"resumed {len(keyframes)} keyframes" in first_words(tmp_path, CONFIG)
+    other = json.loads(CONFIG.read_text())
+    other.setdefault("backend", {})["prior_tilt_deg"] = 2.5
+    (tmp_path / "other.json").write_text(json.dumps(other))
+    said = first_words(tmp_path, tmp_path / "other.json")
+    assert "another configuration" in said and f"{JOURNAL}.old1" in said
+    assert (tmp_path / "journal" / f"{JOURNAL}.old1").stat().st_size > 100_000
+
+
+def test_torn_tail_is_cut_off_and_told(keyframes: list[list[bytes]], tmp_path: Path) -> None:
+    BackendRun(tmp_path, CONFIG, keyframes, 0.0, 1).drive(INTERVAL)
+    file = tmp_path / "journal" / JOURNAL
+    whole = file.stat().st_size
+    with file.open("ab") as out:
+        out.write(b"\x00\x10\x00\x00half a record")
+    said = first_words(tmp_path, CONFIG)
+    assert f"resumed {len(keyframes)} keyframes" in said and "last 17 bytes are left out" in said
+    assert file.stat().st_size == whole
+
+
+def test_full_disk_is_told_and_the_graph_goes_on(keyframes: list[list[bytes]], tmp_path: Path) -> None:
+    (tmp_path / "journal").mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", tmp_path / "journal"], check=True)
+    try:
+        outcome = BackendRun(tmp_path, CONFIG, keyframes, 0.0, 1).drive(INTERVAL)
+    finally:
+        subprocess.run(["umount", tmp_path / "journal"], check=True)
+    assert len(outcome.poses) == len(keyframes)
+    assert any("journal cannot be written: No space left" in text for text in outcome.health)
+
+
+def test_second_back_end_refuses_the_same_journal(private_network, tmp_path: Path) -> None:
+    with Pipeline(tmp_path, BUS) as pipeline:
+        pipeline.start("graph_backend", "--config", CONFIG, "--journal", tmp_path / "journal")
+        (tmp_path / "second").mkdir()
+        with Pipeline(tmp_path / "second", BUS) as second:
+            process = second.start("graph_backend", "--config", CONFIG, "--journal", tmp_path / "journal")
+            assert process.wait(10) == 1
+            assert "another graph_backend uses the journal" in second.last_words("graph_backend")
+
+
+def test_commands_are_answered(private_network, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert graph.main(["--lcm-url", BUS, "withdraw", "7", "3"]) == 1
+    assert "no answer" in capsys.readouterr().err
+    with Pipeline(tmp_path, BUS) as pipeline:
+        pipeline.start("graph_backend", "--config", CONFIG)
+        for command in ("withdraw", "veto"):
+            assert graph.main(["--lcm-url", BUS, command, "7", "3"]) == 0
+            assert "loop 7-3" in capsys.readouterr().out
+        assert graph.main(["--lcm-url", BUS, "full"]) == 0
+        assert "0 keyframes" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("arguments", [["withdraw", "7"], ["veto", "-3", "1"], ["burn"], []])
+def test_wrong_commands_are_refused(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        graph.main(arguments)
+    assert ended.value.code == 2
+
+
+def test_command_numbers_are_those_of_the_message() -> None:
+    assert graph.message_of(graph.parse_arguments(["veto", "9", "2"])).command == graph_command_t.VETO_LOOP
+    assert graph.message_of(graph.parse_arguments(["full"])).from_id == -1
