@@ -22,6 +22,7 @@ constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sa
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
 constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
 constexpr int kScansUntilReacquisition = 5;                // without a correction
+constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
@@ -194,7 +195,6 @@ ScanResult Lio::process(const Scan& scan) {
   if (match.stats.applied()) {
     const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable);
     if (update.ok) cautious_ = update.covariance;
-    drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans * match.inflation);
   }
   if (match.stats.applied()) ++applied_scans_;
   scans_without_correction_ = match.stats.applied() ? 0 : scans_without_correction_ + 1;
@@ -202,7 +202,15 @@ ScanResult Lio::process(const Scan& scan) {
   note_evidence(predicted, match.stats, scan);
   match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(selection.scan, match.stats.reason, cloud, sparse);
-  grow_map(cloud, match.stats.reason);
+  // Standing shows nothing new. A map that went on taking scans would follow whatever the pose does by little and
+  // little.
+  const bool is_settled = match.stats.standing && match.stats.applied() && map_.scans() >= kScansOfASettledMap;
+  if (!is_settled) {
+    if (match.stats.applied()) {
+      drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans * match.inflation);
+    }
+    grow_map(cloud, match.stats.reason);
+  }
 
   ScanResult result;
   result.stats = match.stats;

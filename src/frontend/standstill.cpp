@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kMaxVelocitySigma = 0.1;  // m/s: above it the filter cannot tell standing from rolling
 constexpr double kSigmas = 3.0;
-constexpr std::ptrdiff_t kMinSamples = 4;          // that a quiet window needs
+constexpr std::ptrdiff_t kMinSamples = 4;  // that a quiet window needs
+constexpr Utime kLongWindowUs = 9 * (kMicrosPerSecond / 10);
 constexpr Utime kDelayUs = kMicrosPerSecond / 10;  // between standing and the correction that it leads to
 
 struct Quiet {
@@ -52,22 +53,47 @@ double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
   return std::sqrt(covariance.diagonal().segment<3>(block).maxCoeff());
 }
 
-/// Velocity before the newest samples, by integration back over them, attitude and biases held.
-Standstill before_newest(std::span<const ImuSample> newest, const FilterState& filter, const FrontendConfig& config) {
+/// Velocity before the newest samples, by integration back over them, attitude and biases held; mean turn rate of the
+/// samples before those.
+Standstill measure(std::span<const ImuSample> before, std::span<const ImuSample> newest, const FilterState& filter,
+                   const FrontendConfig& config) {
   const NavState& state = filter.nominal;
-  const double seconds = 1e-6 * static_cast<double>(kDelayUs);
+  const double delay = 1e-6 * static_cast<double>(kDelayUs);
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   for (const ImuSample& sample : newest) force += sample.accel / static_cast<double>(newest.size());
   force -= state.accel_bias;
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : before) rate += sample.gyro / static_cast<double>(before.size());
+  rate -= state.gyro_bias;
   const Eigen::Matrix3d R = state.T_odom_body.rotation.toRotationMatrix();
   Standstill standstill;
-  standstill.velocity = state.v_odom - seconds * (R * force - Eigen::Vector3d(0.0, config.gravity_m, 0.0));
-  standstill.derivative.middleCols<3>(kAttitude) = seconds * R * so3::skew(force);
-  standstill.derivative.middleCols<3>(kVelocity).setIdentity();
-  standstill.derivative.middleCols<3>(kAccelBias) = seconds * R;
-  standstill.variance = config.zero_velocity_sigma * config.zero_velocity_sigma +
-                        config.imu_noise_accel * config.imu_noise_accel * seconds;
+  standstill.estimate.head<3>() = state.v_odom - delay * (R * force - Eigen::Vector3d(0.0, config.gravity_m, 0.0));
+  standstill.estimate.tail<3>() = rate;
+  standstill.derivative.block<3, 3>(0, kAttitude) = delay * R * so3::skew(force);
+  standstill.derivative.block<3, 3>(0, kVelocity).setIdentity();
+  standstill.derivative.block<3, 3>(0, kAccelBias) = delay * R;
+  standstill.derivative.block<3, 3>(3, kGyroBias) = -Eigen::Matrix3d::Identity();
+  const double interval = 0.5e-6 * static_cast<double>(kStandstillWindowUs);
+  standstill.variance.head<3>().setConstant(config.zero_velocity_sigma * config.zero_velocity_sigma +
+                                            config.imu_noise_accel * config.imu_noise_accel * delay);
+  standstill.variance.tail<3>().setConstant(config.imu_noise_gyro * config.imu_noise_gyro / interval);
   return standstill;
+}
+
+/// True when the velocity gained over most of a second is more than noise and bias explain. What a correction to zero
+/// takes away while the vehicle gathers speed never comes back where scans do not see the motion.
+bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, const FrontendConfig& config) {
+  const NavState& state = filter.nominal;
+  const auto begin = std::ranges::lower_bound(samples, state.utime - kLongWindowUs, {}, &ImuSample::utime);
+  const auto end = std::ranges::upper_bound(samples, state.utime, {}, &ImuSample::utime);
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : std::span(begin, end)) force += sample.accel / static_cast<double>(end - begin);
+  const Eigen::Vector3d acceleration =
+      state.T_odom_body.rotation * (force - state.accel_bias) - Eigen::Vector3d(0.0, config.gravity_m, 0.0);
+  const double seconds = seconds_between(begin->utime, std::prev(end)->utime);
+  const double noise = config.imu_noise_accel / std::sqrt(seconds);
+  const double sigma = std::hypot(noise, largest_sigma(filter.covariance, kAccelBias));
+  return acceleration.norm() > kSigmas * sigma;
 }
 
 }  // namespace
@@ -76,8 +102,7 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
                                           const FrontendConfig& config) {
   const NavState& state = filter.nominal;
   const double velocity_sigma = largest_sigma(filter.covariance, kVelocity);
-  const double speed_limit =
-      std::min(config.stationary_speed + kSigmas * velocity_sigma, 4.0 * config.stationary_speed);
+  const double speed_limit = std::min(config.stationary_speed + 2.0 * velocity_sigma, 3.0 * config.stationary_speed);
   if (velocity_sigma > kMaxVelocitySigma || state.v_odom.norm() > speed_limit) return std::nullopt;
 
   const auto begin = std::ranges::lower_bound(samples, state.utime - kStandstillWindowUs, {}, &ImuSample::utime);
@@ -96,17 +121,19 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
   const bool still = quiet.gyro_sigma <= config.rest_gyro_sigma && quiet.accel_sigma <= config.rest_accel_sigma &&
                      (quiet.gyro - state.gyro_bias).norm() <= gyro_limit && quiet.accel_drift.norm() <= drift_limit &&
                      std::abs((quiet.accel - state.accel_bias).norm() - config.gravity_m) <= config.rest_accel_band;
-  if (!still) return std::nullopt;
-  return before_newest({newest, end}, filter, config);
+  if (!still || sets_off(samples, filter, config)) return std::nullopt;
+  const auto rate_begin =
+      std::ranges::lower_bound(samples, state.utime - kDelayUs - kStandstillWindowUs / 2, {}, &ImuSample::utime);
+  return measure({rate_begin, newest}, {newest, end}, filter, config);
 }
 
 void correct_to_standstill(FilterState& filter, const Standstill& standstill) {
   const Matrix15d& P = filter.covariance;
-  const Eigen::Matrix<double, 3, 15>& H = standstill.derivative;
-  const Eigen::Matrix3d R = standstill.variance * Eigen::Matrix3d::Identity();
-  const Eigen::Matrix<double, 15, 3> K = P * H.transpose() * (H * P * H.transpose() + R).inverse();
+  const Eigen::Matrix<double, 6, 15>& H = standstill.derivative;
+  const Matrix6d R = standstill.variance.asDiagonal();
+  const Eigen::Matrix<double, 15, 6> K = P * H.transpose() * (H * P * H.transpose() + R).inverse();
   const Matrix15d kept = Matrix15d::Identity() - K * H;
-  const Vector15d step = -K * standstill.velocity;
+  const Vector15d step = -K * standstill.estimate;
   filter.covariance = kept * P * kept.transpose() + K * R * K.transpose();
   filter.covariance = (0.5 * (filter.covariance + filter.covariance.transpose())).eval();
   filter.nominal = perturbed(filter.nominal, step);

@@ -12,12 +12,13 @@ namespace ignis {
 /// Windows of this length have to be quiet; between two corrections there is half of one.
 inline constexpr Utime kStandstillWindowUs = kMicrosPerSecond / 2;
 
-/// What standing says about the velocity: it was zero a tenth of a second ago. A vehicle that has just set off is
-/// so not held back before its acceleration shows.
+/// What standing says: the velocity was zero a tenth of a second ago, so that a vehicle which has just set off is not
+/// held back before its acceleration shows, and so was the turn rate over the half window before that. Order of rows:
+/// velocity (odom axes) [m/s], turn rate (body axes) [rad/s].
 struct Standstill {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s] estimated for that instant, odom axes
-  Eigen::Matrix<double, 3, 15> derivative = Eigen::Matrix<double, 3, 15>::Zero();  ///< of it, by the error of the state
-  double variance = 0.0;  ///< [m^2/s^2] per axis, of IMU noise between then and now and of `zero_velocity_sigma`
+  Vector6d estimate = Vector6d::Zero();  ///< of both; what differs from zero is error
+  Eigen::Matrix<double, 6, 15> derivative = Eigen::Matrix<double, 6, 15>::Zero();  ///< by the error of the state
+  Vector6d variance = Vector6d::Zero();  ///< of IMU noise and of `zero_velocity_sigma`
 };
 
 /// Something when the vehicle stood during the half second before `filter.nominal.utime`: IMU quiet within the
@@ -26,8 +27,9 @@ struct Standstill {
 [[nodiscard]] std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
                                                         const FrontendConfig& config);
 
-/// Kalman update with the measurement "velocity = 0" (zero-velocity update; I. Skog et al., "Zero-velocity detection -
-/// an algorithm evaluation", IEEE TBME 57(11), 2010). Joseph form: the covariance stays positive.
+/// Kalman update with the measurement "velocity and turn rate = 0" (zero-velocity update; I. Skog et al.,
+/// "Zero-velocity detection - an algorithm evaluation", IEEE TBME 57(11), 2010). Joseph form: the covariance stays
+/// positive.
 void correct_to_standstill(FilterState& filter, const Standstill& standstill);
 
 }  // namespace ignis

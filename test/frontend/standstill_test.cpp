@@ -46,7 +46,7 @@ TEST(Standstill, IsSeenInAQuietHalfSecond) {
   for (std::uint32_t seed = 0; seed < 100; ++seed) {
     seen += stands_still(quiet_samples(seed), resting_state(), FrontendConfig{}) ? 1 : 0;
   }
-  EXPECT_GE(seen, 95);
+  EXPECT_GE(seen, 90) << "two gates at three sigma of three axes refuse 2.9 % each";
 }
 
 TEST(Standstill, IsNotTakenForASteadyDriveWhoseImuIsAsQuiet) {
@@ -99,7 +99,7 @@ TEST(Standstill, DerivativeOfTheEarlierVelocityIsTheNumericalOne) {
     moved.nominal = perturbed(filter.nominal, kStep * Vector15d::Unit(i));
     const auto there = find_standstill(samples, moved, FrontendConfig{});
     ASSERT_TRUE(there);
-    EXPECT_LT(((there->velocity - at->velocity) / kStep - at->derivative.col(i)).norm(), 1e-4) << i;
+    EXPECT_LT(((there->estimate - at->estimate) / kStep - at->derivative.col(i)).norm(), 1e-4) << i;
   }
 }
 
@@ -111,13 +111,28 @@ TEST(Standstill, CorrectionEqualsAKalmanUpdateWrittenOut) {
 
   // Independent form: information matrices added.
   const auto& H = standstill->derivative;
-  const Matrix15d expected = (P.inverse() + H.transpose() * H / standstill->variance).inverse();
-  const Vector15d step = -expected * H.transpose() * standstill->velocity / standstill->variance;
+  const Matrix6d W = standstill->variance.cwiseInverse().asDiagonal();
+  const Matrix15d expected = (P.inverse() + H.transpose() * W * H).inverse();
+  const Vector15d step = -expected * H.transpose() * W * standstill->estimate;
   const NavState moved = perturbed(filter.nominal, step);
 
   correct_to_standstill(filter, *standstill);
   EXPECT_LT((filter.covariance - expected).norm(), 1e-9 * P.norm());
   EXPECT_LT(difference(moved, filter.nominal).norm(), 1e-12);
+}
+
+TEST(Standstill, TeachesTheGyroBias) {
+  std::vector<ImuSample> samples = quiet_samples(1);
+  for (ImuSample& sample : samples) sample.gyro = {0.002, -0.001, 0.0015};
+  FilterState filter = resting_state();
+  const auto standstill = find_standstill(samples, filter, FrontendConfig{});
+  ASSERT_TRUE(standstill);
+  for (int i = 0; i < 400; ++i) {
+    const auto again = find_standstill(samples, filter, FrontendConfig{});
+    ASSERT_TRUE(again);
+    correct_to_standstill(filter, *again);
+  }
+  EXPECT_LT((filter.nominal.gyro_bias - samples[0].gyro).norm(), 3e-4);
 }
 
 TEST(Standstill, DoesNotHoldBackAVehicleThatSetsOff) {
