@@ -174,8 +174,9 @@ def _receivers(health: Iterable[Any]) -> dict[str, dict[str, dict[str, int]]]:
 
 
 def constant_name(message: Any, value: int) -> str:
-    """The name of an enumeration constant of a message type."""
-    constants = {getattr(type(message), n): n for n in dir(type(message)) if n.isupper() and not n.startswith("_")}
+    """The name of an enumeration constant of a message type: of its reasons, where it has stages as well."""
+    names = (n for n in dir(type(message)) if n.isupper() and not n.startswith(("_", "STAGE_")))
+    constants = {getattr(type(message), n): n for n in names}
     return constants.get(value, f"CODE_{value}")
 
 

@@ -24,7 +24,8 @@ namespace {
 
 using gtsam::symbol_shorthand::X;
 
-constexpr int kFinalSteps = 3;  // Gauss-Newton steps over the whole graph once everything is in
+constexpr int kFinalSteps = 3;                // Gauss-Newton steps over the whole graph once everything is in
+constexpr std::size_t kFinalBatchSteps = 20;  // at most, from there
 constexpr double kHoldSigma = 1e-6;
 constexpr std::size_t kNamedVertices = 5;  // of those that hang in the air
 constexpr std::size_t kBatchIterations = 100;
@@ -110,19 +111,16 @@ void PoseGraphOptimiser::add_next() {
   }
   const SolverOutcome outcome = solver_.add(factors, values);
   if (!outcome.accepted) throw std::runtime_error(std::format("vertex {}: {}", id, outcome.reason));
-  if (entered_ == 0) hold_ = outcome.factors.front();
   place_in_entry_[id] = entered_++;
 }
 
 PoseGraphSolution PoseGraphOptimiser::finish() {
   assert(complete());
-  PoseGraphSolution solution;
   solver_.settle(kFinalSteps * relinearize_skip_);
-  for (const KeyframePose& vertex : graph_.vertices) {
-    solution.poses.push_back({vertex.id, from_gtsam(solver_.pose(key_of(vertex.id)))});
-  }
-  solution.half_chi_square = solver_.half_chi_square() - solver_.half_chi_square(hold_);
-  return solution;
+  PoseGraph settled = graph_;
+  for (KeyframePose& vertex : settled.vertices) vertex.T_map_body = from_gtsam(solver_.pose(key_of(vertex.id)));
+  // Linearisation points may still lie within the solver's thresholds of where they should be.
+  return optimise_in_batch(settled, [](std::size_t iteration, double) { return iteration < kFinalBatchSteps; });
 }
 
 PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config) {

@@ -32,7 +32,8 @@ class PoseGraphOptimiser {
   /// One update of the solver. Requires !complete(). Throws std::runtime_error when the solver refuses the pose.
   void add_next();
 
-  /// Settles the whole graph. Requires complete().
+  /// Settles the whole graph: updates without news, then batch steps from where they end, as the back end swaps in its
+  /// batch optimum. Requires complete().
   [[nodiscard]] PoseGraphSolution finish();
 
  private:
@@ -50,7 +51,6 @@ class PoseGraphOptimiser {
   std::unordered_map<std::int32_t, std::size_t> place_in_entry_;  ///< of the ids that are in: how many came before
   IncrementalSolver solver_;
   std::size_t entered_ = 0;
-  FactorId hold_ = 0;
 };
 
 /// All steps of PoseGraphOptimiser at once.

@@ -71,7 +71,7 @@ TEST(LoopMessages, CarryOutcomeFiguresAndWords) {
   EXPECT_EQ(message.overlap, 0.8);
   EXPECT_EQ(message.chi_square, 3.5);
   EXPECT_EQ(message.chi_square_bound, 22.5);
-  EXPECT_EQ(message.stage, loop_result_t::CANDIDATE);
+  EXPECT_EQ(message.stage, loop_result_t::STAGE_CANDIDATE);
   EXPECT_EQ(message.relative_position[2], 3.0);
 }
 
@@ -85,9 +85,9 @@ TEST(LoopMessages, NumberReasonsAndStagesAsTheCoreDoes) {
   EXPECT_EQ(reason(LoopReason::kNeedsSupport), loop_result_t::NEEDS_SUPPORT);
   EXPECT_EQ(reason(LoopReason::kKept), loop_result_t::KEPT);
   EXPECT_EQ(reason(LoopReason::kVetoed), loop_result_t::VETOED);
-  EXPECT_EQ(stage(LoopStage::kNone), loop_result_t::NO_LOOP);
-  EXPECT_EQ(stage(LoopStage::kVerified), loop_result_t::VERIFIED);
-  EXPECT_EQ(stage(LoopStage::kOnTrial), loop_result_t::ON_TRIAL);
+  EXPECT_EQ(stage(LoopStage::kNone), loop_result_t::STAGE_NO_LOOP);
+  EXPECT_EQ(stage(LoopStage::kVerified), loop_result_t::STAGE_VERIFIED);
+  EXPECT_EQ(stage(LoopStage::kOnTrial), loop_result_t::STAGE_ON_TRIAL);
   EXPECT_EQ(stage(LoopStage::kKept), loop_result_t::STAGE_KEPT);
   EXPECT_EQ(stage(LoopStage::kWithdrawn), loop_result_t::STAGE_WITHDRAWN);
 }
