@@ -108,6 +108,17 @@ double quantile(std::vector<double> values, double ratio) {
   return values[static_cast<std::size_t>(ratio * static_cast<double>(values.size() - 1))];
 }
 
+/// Median per quarter of the drive: what a scan costs must not grow with the way driven.
+std::vector<double> medians_by_quarter(const std::vector<double>& values) {
+  std::vector<double> medians;
+  for (std::size_t quarter = 0; quarter < 4; ++quarter) {
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(quarter * values.size() / 4);
+    const auto end = values.begin() + static_cast<std::ptrdiff_t>((quarter + 1) * values.size() / 4);
+    medians.push_back(quantile({begin, end}, 0.5));
+  }
+  return medians;
+}
+
 Json inventory_json(const LogInventory& inventory) {
   return {{"used", inventory.used},
           {"ignored", inventory.ignored},
@@ -157,6 +168,7 @@ Json report(const runtime::Application& application, const std::filesystem::path
                     {"real_time_factor", timing.wall_s > 0.0 ? seconds / timing.wall_s : 0.0},
                     {"scan_p50_ms", quantile(result.scan_times_ms, 0.5)},
                     {"scan_p99_ms", quantile(result.scan_times_ms, 0.99)},
+                    {"scan_p50_ms_by_quarter", medians_by_quarter(result.scan_times_ms)},
                     {"frontend", timer_json(pipeline.frontend_timer())},
                     {"backend", timer_json(pipeline.backend_timer())},
                     {"map", timer_json(pipeline.map_timer())}};
