@@ -4,12 +4,16 @@
 #include <gtsam/geometry/Pose3.h>
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/linear/linearExceptions.h>
-#include <gtsam/nonlinear/ISAM2.h>
 #include <gtsam/nonlinear/Marginals.h>
 
+#include <algorithm>
 #include <cmath>
 #include <format>
+#include <limits>
+#include <unordered_set>
+#include <utility>
 
+#include "backend/observed_isam2.h"
 #include "common/config_check.h"
 
 namespace ignis {
@@ -33,6 +37,8 @@ gtsam::ISAM2Params parameters(const SolverConfig& config) {
   return params;
 }
 
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
 std::string name_of(gtsam::Key key) { return std::string(gtsam::Symbol(key)); }
 
 }  // namespace
@@ -41,7 +47,7 @@ struct IncrementalSolver::Impl {
   explicit Impl(const SolverConfig& config) : params(parameters(config)), isam(params) {}
 
   /// Why the batch must not reach GTSAM, or an empty text.
-  [[nodiscard]] std::string problem(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news) const {
+  [[nodiscard]] std::string problem(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news) {
     if (!broken.empty()) return broken;
     for (const gtsam::Key key : news.keys()) {
       if (isam.valueExists(key)) return std::format("variable {} exists already", name_of(key));
@@ -52,7 +58,7 @@ struct IncrementalSolver::Impl {
         if (news.exists(key)) {
           around.insert(key, news.at(key));
         } else if (isam.valueExists(key)) {
-          around.insert(key, isam.calculateEstimate(key));
+          around.insert(key, estimate_of(std::span(&key, 1)).at(key));
         } else {
           return std::format("a factor names the unknown variable {}", name_of(key));
         }
@@ -67,12 +73,16 @@ struct IncrementalSolver::Impl {
   /// One update of iSAM2; the reason if it failed.
   [[nodiscard]] std::string update(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news,
                                    const gtsam::FactorIndices& removed, gtsam::FactorIndices& indices) {
-    fresh = false;
     try {
-      indices = isam.update(batch, news, removed).newFactorsIndices;
-      for (const auto& [key, delta] : isam.getDelta()) {
-        if (!delta.allFinite()) return std::format("the solution at {} is not finite", name_of(key));
+      ObservedIsam2::Step step = isam.advance(batch, news, removed);
+      indices = std::move(step.new_factors);
+      relinearised = step.relinearised;
+      const gtsam::VectorValues& delta = isam.solved_delta();
+      for (const gtsam::Key key : step.moved) {
+        if (!delta.at(key).allFinite()) return std::format("the solution at {} is not finite", name_of(key));
       }
+      stale.insert(step.moved.begin(), step.moved.end());
+      changed.insert(step.moved.begin(), step.moved.end());
     } catch (const gtsam::IndeterminantLinearSystemException& e) {
       return std::format("the graph is undetermined near {}", name_of(e.nearbyVariable()));
     } catch (const std::exception& e) {
@@ -84,7 +94,9 @@ struct IncrementalSolver::Impl {
   /// A new iSAM2 from the living factors at the last good solution. Should even that fail, the solver keeps its last
   /// solution and refuses everything from then on.
   void rebuild() {
-    isam = gtsam::ISAM2(params);
+    isam = ObservedIsam2(params);
+    stale.clear();
+    id_of.clear();
     gtsam::NonlinearFactorGraph living;
     std::vector<FactorId> ids;
     for (FactorId id = 0; id < factors.size(); ++id) {
@@ -95,10 +107,16 @@ struct IncrementalSolver::Impl {
     gtsam::FactorIndices indices;
     if (const std::string failure = update(living, values, {}, indices); !failure.empty()) {
       broken = "the graph cannot be rebuilt: " + failure;
-      fresh = true;
       return;
     }
-    for (std::size_t i = 0; i < ids.size(); ++i) isam_index[ids[i]] = indices[i];
+    for (std::size_t i = 0; i < ids.size(); ++i) place(ids[i], indices[i]);
+  }
+
+  /// Notes that iSAM2 knows the factor as `index`.
+  void place(FactorId id, std::size_t index) {
+    isam_index[id] = index;
+    if (id_of.size() <= index) id_of.resize(index + 1);
+    id_of[index] = id;
   }
 
   void recover() {
@@ -107,19 +125,41 @@ struct IncrementalSolver::Impl {
   }
 
   const gtsam::Values& estimate() {
-    if (!fresh) {
-      values = isam.calculateEstimate();
-      fresh = true;
+    for (const gtsam::Key key : stale) refresh(key);
+    stale.clear();
+    return values;
+  }
+
+  const gtsam::Values& estimate_of(std::span<const gtsam::Key> keys) {
+    for (const gtsam::Key key : keys) {
+      if (stale.erase(key) > 0) refresh(key);
     }
     return values;
   }
 
+  void refresh(gtsam::Key key) {
+    gtsam::Value* moved = isam.getLinearizationPoint().at(key).retract_(isam.solved_delta().at(key));
+    values.update(key, *moved);
+    moved->deallocate_();
+    for (const std::size_t index : isam.getVariableIndex()[key]) errors[id_of[index]] = kUnknown;
+  }
+
+  double error_of(FactorId id) {
+    const gtsam::Values& around = estimate_of(factors.at(id)->keys());
+    if (std::isnan(errors[id])) errors[id] = factors[id]->error(around);
+    return errors[id];
+  }
+
   gtsam::ISAM2Params params;
-  gtsam::ISAM2 isam;
+  ObservedIsam2 isam;
   std::vector<gtsam::NonlinearFactor::shared_ptr> factors;  ///< by FactorId; empty when removed
   std::vector<std::size_t> isam_index;                      ///< by FactorId
-  gtsam::Values values;                                     ///< last solution that was asked for, and what came since
-  bool fresh = true;                                        ///< `values` is the current solution
+  std::vector<double> errors;                               ///< by FactorId: half chi-square at `values`, or kUnknown
+  std::vector<FactorId> id_of;                              ///< by index in iSAM2
+  gtsam::Values values;                  ///< of each variable, the last solution that was asked for, or its first value
+  std::unordered_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
+  std::unordered_set<gtsam::Key> changed;  ///< variables that it has moved since take_changed()
+  bool relinearised = false;               ///< something, in the last update
   int rebuilds = 0;
   std::string broken;  ///< why nothing is accepted any more; empty while all is well
 };
@@ -144,9 +184,12 @@ SolverOutcome IncrementalSolver::add(const gtsam::NonlinearFactorGraph& factors,
     return outcome;
   }
   for (std::size_t i = 0; i < factors.size(); ++i) {
-    outcome.factors.push_back(impl_->factors.size());
+    const FactorId id = impl_->factors.size();
+    outcome.factors.push_back(id);
     impl_->factors.push_back(factors[i]);
-    impl_->isam_index.push_back(indices[i]);
+    impl_->isam_index.push_back(0);
+    impl_->errors.push_back(kUnknown);
+    impl_->place(id, indices[i]);
   }
   impl_->values.insert(values);
   outcome.accepted = true;
@@ -174,38 +217,52 @@ SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
 }
 
 bool IncrementalSolver::settle(int updates) {
-  for (int i = 0; i < updates && impl_->broken.empty(); ++i) {
+  // iSAM2 looks at the thresholds in one of relinearizeSkip updates. If it finds nothing there, it never will.
+  int idle = 0;
+  for (int i = 0; i < updates && idle < impl_->params.relinearizeSkip && impl_->broken.empty(); ++i) {
     gtsam::FactorIndices none;
     if (!impl_->update({}, {}, {}, none).empty()) {
       impl_->recover();
       return false;
     }
+    idle = impl_->relinearised ? 0 : idle + 1;
   }
+  // Should iSAM2 have to be built anew one day, then not where the graph was before a large correction.
+  impl_->estimate();
   return impl_->broken.empty();
 }
 
 const gtsam::Values& IncrementalSolver::estimate() { return impl_->estimate(); }
 
+const gtsam::Values& IncrementalSolver::estimate_of(std::span<const std::uint64_t> keys) {
+  return impl_->estimate_of(keys);
+}
+
+std::vector<std::uint64_t> IncrementalSolver::take_changed() {
+  std::vector<std::uint64_t> changed(impl_->changed.begin(), impl_->changed.end());
+  impl_->changed.clear();
+  std::ranges::sort(changed);
+  return changed;
+}
+
 const gtsam::Values& IncrementalSolver::linearisation_points() const {
   return impl_->broken.empty() ? impl_->isam.getLinearizationPoint() : impl_->values;
 }
 
-gtsam::Pose3 IncrementalSolver::pose(std::uint64_t key) const {
-  return impl_->broken.empty() ? impl_->isam.calculateEstimate<gtsam::Pose3>(key) : impl_->values.at<gtsam::Pose3>(key);
+gtsam::Pose3 IncrementalSolver::pose(std::uint64_t key) {
+  return impl_->estimate_of(std::span(&key, 1)).at<gtsam::Pose3>(key);
 }
 
 double IncrementalSolver::half_chi_square() {
-  const gtsam::Values& values = impl_->estimate();
   double sum = 0.0;
-  for (const auto& factor : impl_->factors) {
-    if (factor) sum += factor->error(values);
+  impl_->estimate();
+  for (FactorId id = 0; id < impl_->factors.size(); ++id) {
+    if (impl_->factors[id]) sum += impl_->error_of(id);
   }
   return sum;
 }
 
-double IncrementalSolver::half_chi_square(FactorId factor) {
-  return impl_->factors.at(factor)->error(impl_->estimate());
-}
+double IncrementalSolver::half_chi_square(FactorId factor) { return impl_->error_of(factor); }
 
 std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint64_t key) const {
   try {

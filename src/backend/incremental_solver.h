@@ -29,7 +29,7 @@ struct SolverConfig {
   double relinearize_velocity = 0.05;
   double relinearize_bias = 0.01;
   int relinearize_skip = 1;
-  double wildfire_threshold = 1e-6;
+  double wildfire_threshold = 5e-7;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.number("relinearize_position_m", self.relinearize_position_m, {1e-6, 1.0}, "m",
@@ -73,18 +73,25 @@ class IncrementalSolver {
   /// Takes factors out again. Must not leave a variable without factors.
   [[nodiscard]] SolverOutcome remove(std::span<const FactorId> factors);
 
-  /// Further updates without news, after a large correction. False when the solver had to be rebuilt.
+  /// Further updates without news, after a large correction; fewer when nothing is left to linearise anew. False when
+  /// the solver had to be rebuilt.
   bool settle(int updates);
 
   /// The current solution; valid until the next call that changes the graph.
   [[nodiscard]] const gtsam::Values& estimate();
 
+  /// Keys of the variables that the solution has moved since the last call, ascending.
+  [[nodiscard]] std::vector<std::uint64_t> take_changed();
+
   /// Where the factors are linearised. A solver that begins with these values and the same factors has the same
   /// solution.
   [[nodiscard]] const gtsam::Values& linearisation_points() const;
 
+  /// The same, but only the variables `keys` are brought up to date: others may be older. They must exist.
+  [[nodiscard]] const gtsam::Values& estimate_of(std::span<const std::uint64_t> keys);
+
   /// One pose of it, without the cost of all the others. The variable must exist.
-  [[nodiscard]] gtsam::Pose3 pose(std::uint64_t key) const;
+  [[nodiscard]] gtsam::Pose3 pose(std::uint64_t key);
 
   /// Half chi-square at the current solution, of the whole graph and of one factor.
   [[nodiscard]] double half_chi_square();

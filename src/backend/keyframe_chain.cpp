@@ -39,7 +39,7 @@ SolverOutcome insert_first(const Keyframe& keyframe, const BackendConfig& config
 SolverOutcome insert_next(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
                           SmootherState& state, GraphNode& node, std::string& left_out) {
   LinkEnd previous = state.nodes.back().end;
-  previous.estimate = estimate_of(solver.estimate(), previous.id);
+  previous.estimate = estimate_of(solver, previous.id);
   // The information belongs to the interval since id - 1 and says nothing about a longer one.
   WhiteningRows odometry(0, 6);
   if (keyframe.id == previous.id + 1) {

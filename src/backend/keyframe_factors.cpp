@@ -10,6 +10,7 @@
 #include <gtsam/slam/BetweenFactor.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -143,6 +144,10 @@ NavState estimate_of(const gtsam::Values& values, std::int32_t id) {
   state.gyro_bias = bias.gyroscope();
   state.accel_bias = bias.accelerometer();
   return state;
+}
+
+NavState estimate_of(IncrementalSolver& solver, std::int32_t id) {
+  return estimate_of(solver.estimate_of(std::array<std::uint64_t, 3>{X(id), V(id), B(id)}), id);
 }
 
 }  // namespace ignis

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "backend/backend_config.h"
+#include "backend/incremental_solver.h"
 #include "backend/information.h"
 #include "backend/preintegration.h"
 #include "common/keyframe.h"
@@ -57,5 +58,6 @@ void insert_estimate(std::int32_t id, const NavState& state, gtsam::Values& valu
 
 /// Pose, velocity and biases of a keyframe (fields named odom are in map); the other fields keep their defaults.
 [[nodiscard]] NavState estimate_of(const gtsam::Values& values, std::int32_t id);
+[[nodiscard]] NavState estimate_of(IncrementalSolver& solver, std::int32_t id);
 
 }  // namespace ignis

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backend/revision_report.h"
 
+#include <gtsam/geometry/Pose3.h>
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/nonlinear/Values.h>
 
+#include "backend/gtsam_conversion.h"
 #include "backend/keyframe_factors.h"
 
 namespace ignis {
@@ -15,6 +17,7 @@ constexpr double kMovedPosition = 1e-4;  // [m]
 constexpr double kMovedRotation = 1e-5;  // [rad]
 
 bool has_moved(const Pose& a, const Pose& b) {
+  if (a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs()) return false;
   const Vector6d d = body_difference(a, b);
   return d.head<3>().norm() > kMovedRotation || d.tail<3>().norm() > kMovedPosition;
 }
@@ -32,9 +35,13 @@ void list_moved(SmootherState& state, SmootherUpdate& update) {
 }  // namespace
 
 void refresh_poses(IncrementalSolver& solver, SmootherState& state) {
-  state.poses.clear();
-  for (const GraphNode& node : state.nodes) {
-    state.poses.push_back({node.end.id, estimate_of(solver.estimate(), node.end.id).T_odom_body});
+  for (std::size_t i = state.poses.size(); i < state.nodes.size(); ++i) {
+    state.poses.push_back({state.nodes[i].end.id, {}});
+  }
+  for (const gtsam::Key key : solver.take_changed()) {
+    const gtsam::Symbol symbol(key);
+    if (symbol.chr() != 'x') continue;
+    state.poses[state.place_of(static_cast<std::int32_t>(symbol.index()))].T_map_body = from_gtsam(solver.pose(key));
   }
 }
 
@@ -49,7 +56,7 @@ void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUp
   update.T_map_odom = T_map_odom(state);
   if (state.nodes.empty()) return;
   const LinkEnd& end = state.nodes.back().end;
-  update.newest = estimate_of(solver.estimate(), end.id);
+  update.newest = estimate_of(solver, end.id);
   update.newest.utime = end.utime;
   update.newest.angular_rate = state.angular_rate;
   if (!update.accepted()) return;

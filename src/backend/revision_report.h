@@ -7,7 +7,7 @@
 /// What a call of the smoother tells the outside of the graph.
 namespace ignis {
 
-/// Reads the poses of all nodes from the solver.
+/// Reads the poses that the solver has moved since the last call, and those of new nodes.
 void refresh_poses(IncrementalSolver& solver, SmootherState& state);
 
 /// Takes odom to map at the newest node; the identity while there is none.
