@@ -19,7 +19,7 @@ DegeneracyAnalysis BlindDirections::add_scan(const Matrix6d& sensitivity, const 
   const double share = settled ? kShareOfNewestScan : 1.0;
   sensitivity_ += share * (sensitivity - sensitivity_);
   noise_ += share * (noise - noise_);
-  const DegeneracyAnalysis newest = analyse_degeneracy(sensitivity_, noise_, limits);
+  DegeneracyAnalysis newest = analyse_degeneracy(sensitivity_, noise_, limits);
   if (!settled || (newest.degenerate_directions == 0 && held_scans_ == 0)) return newest;
 
   if (held_scans_ == 0 || disagreeing_ > kMostDisagreeing) restart(limits.length_m);
