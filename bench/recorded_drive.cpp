@@ -80,18 +80,20 @@ const RecordedDrive& recorded_drive(std::string_view sensor) {
 LocalMap map_before_last(const RecordedDrive& drive) {
   LocalMap map(drive.config);
   for (std::size_t i = 0; i + 1 < drive.scans.size(); ++i) {
-    const std::vector<CloudPoint> cloud = deskew(drive.scans[i], drive.states[i], drive.imu, drive.config);
+    const std::vector<CloudPoint> cloud = deskew(drive.scans[i], drive.states[i], drive.imu, drive.config.gravity_m);
     map.insert(positions(cloud), drive.states[i].T_odom_body, true);
   }
   return map;
 }
 
 std::vector<CloudPoint> last_cloud(const RecordedDrive& drive) {
-  return deskew(drive.scans.back(), drive.states.back(), drive.imu, drive.config);
+  return deskew(drive.scans.back(), drive.states.back(), drive.imu, drive.config.gravity_m);
 }
 
 std::vector<Eigen::Vector3f> last_thinned(const RecordedDrive& drive) {
-  return positions(thin(last_cloud(drive), drive.config.voxel_size_m, drive.config.max_scan_points));
+  const std::vector<CloudPoint> cloud = last_cloud(drive);
+  if (std::ssize(cloud) <= drive.config.max_scan_points) return positions(cloud);
+  return positions(every_nth(voxel_downsample(cloud, drive.config.voxel_size_m), drive.config.max_scan_points));
 }
 
 }  // namespace ignis::bench

@@ -15,7 +15,7 @@ from typing import Any
 
 from ignis.errors import InputError, run_command, run_quietly
 from ignis.evaluation.consistency import BAND, band, nees_of
-from ignis.evaluation.drives import Simulation, simulate
+from ignis.evaluation.drives import Simulation, simulated
 from ignis.files import write_text
 from ignis.poses import read_tum
 from ignis.trajectory_error import errors_of, paired
@@ -108,8 +108,20 @@ def table(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _write(rows: list[Row], folder: Path) -> None:
+    write_text(folder / "evaluation.md", table(rows))
+    plain = [
+        {"scene": row.simulation.scene, "seed": row.simulation.seed, "variant": row.variant.name} | row.figures
+        for row in rows
+    ]
+    write_text(folder / "evaluation.json", json.dumps(plain, indent=2) + "\n")
+
+
 def evaluate(arguments: argparse.Namespace) -> int:
-    """Simulates and replays everything; the table is written anew after each drive."""
+    """Simulates and replays everything; both tables are written anew after each drive."""
+    missing = [name for name in arguments.scenes if not (_CHECKOUT / "config" / "scenes" / f"{name}.json").is_file()]
+    if missing:
+        raise InputError(f"no such scene: {', '.join(missing)}")
     binaries = Path(os.environ["IGNIS_BUILD"]) / "bin"
     variants = arguments.variant or [Variant("as configured")]
     drives = [(scene, seed) for seed in arguments.seeds for scene in arguments.scenes]
@@ -118,8 +130,9 @@ def evaluate(arguments: argparse.Namespace) -> int:
 
         def run(drive: tuple[str, int]) -> list[Row]:
             scene = _CHECKOUT / "config" / "scenes" / f"{drive[0]}.json"
-            simulation = simulate(
-                binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, arguments.out / "inputs"
+            inputs = arguments.out / "inputs"
+            simulation = simulated(
+                binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, inputs
             )
             return [_replay(simulation, v, arguments.config, arguments.out / "runs", binaries) for v in variants]
 
@@ -131,18 +144,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
                     f"{row.variant.name}: ATE {row.figures['ate_m']:.3f} m",
                     flush=True,
                 )
-            write_text(arguments.out / "evaluation.md", table(rows))
-    write_text(
-        arguments.out / "evaluation.json",
-        json.dumps(
-            [
-                {"scene": r.simulation.scene, "seed": r.simulation.seed, "variant": r.variant.name} | r.figures
-                for r in rows
-            ],
-            indent=2,
-        )
-        + "\n",
-    )
+            _write(rows, arguments.out)
     print(f"\n{table(rows)}\n{arguments.out / 'evaluation.md'}")
     return 0
 
@@ -177,9 +179,6 @@ def main(arguments: list[str] | None = None) -> int:
     parsed = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
     if parsed.jobs < 1:
         parser.error("--jobs: at least 1")
-    missing = [name for name in parsed.scenes if not (_CHECKOUT / "config" / "scenes" / f"{name}.json").is_file()]
-    if missing:
-        return run_command(lambda: (_ for _ in ()).throw(InputError(f"no such scene: {', '.join(missing)}")))
     return run_command(lambda: evaluate(parsed))
 
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "common/grid.h"
+
 namespace ignis {
 namespace {
 
@@ -13,9 +15,7 @@ constexpr double kCellSize = 0.5;  // [m] a search for neighbours looks at a few
 // A plane must extend in two directions: the middle eigenvalue of a scan line alone is noise.
 constexpr double kSmallestWidthRatio = 0.02;
 
-Eigen::Vector3i cell_of(const Eigen::Vector3d& point, double size) {
-  return (point / size).array().floor().cast<int>();
-}
+Eigen::Vector3i cell_at(const Eigen::Vector3d& point, double size) { return cell_of<double>(point / size); }
 
 std::uint64_t key_of(const Eigen::Vector3i& cell) {
   constexpr std::uint64_t kMask = (1U << 21U) - 1U;
@@ -29,14 +29,14 @@ std::vector<Eigen::Vector3d> one_per_voxel(std::span<const Eigen::Vector3d> poin
   std::unordered_set<std::uint64_t> taken;
   std::vector<Eigen::Vector3d> kept;
   for (const Eigen::Vector3d& point : points) {
-    if (taken.insert(key_of(cell_of(point, voxel_m))).second) kept.push_back(point);
+    if (taken.insert(key_of(cell_at(point, voxel_m))).second) kept.push_back(point);
   }
   return kept;
 }
 
 PlaneMap::PlaneMap(std::span<const Eigen::Vector3d> points, double voxel_m, const PlaneGates& gates)
     : gates_(gates), points_(one_per_voxel(points, voxel_m)), entries_(points_.size()) {
-  for (std::size_t i = 0; i < points_.size(); ++i) cells_[key_of(cell_of(points_[i], kCellSize))].push_back(i);
+  for (std::size_t i = 0; i < points_.size(); ++i) cells_[key_of(cell_at(points_[i], kCellSize))].push_back(i);
 }
 
 template <class Visit>
@@ -47,7 +47,7 @@ void PlaneMap::visit_cell(const Eigen::Vector3i& cell, Visit visit) const {
 }
 
 std::optional<std::size_t> PlaneMap::nearest_point(const Eigen::Vector3d& point, double radius_m) const {
-  const Eigen::Vector3i home = cell_of(point, kCellSize);
+  const Eigen::Vector3i home = cell_at(point, kCellSize);
   const int reach = static_cast<int>(std::ceil(radius_m / kCellSize));
   double best = radius_m * radius_m;
   std::optional<std::size_t> nearest;
@@ -74,8 +74,8 @@ std::optional<std::size_t> PlaneMap::nearest_point(const Eigen::Vector3d& point,
 }
 
 PlaneMap::Entry PlaneMap::fit_plane(const Eigen::Vector3d& at) const {
-  const Eigen::Vector3i low = cell_of(at - Eigen::Vector3d::Constant(gates_.radius_m), kCellSize);
-  const Eigen::Vector3i high = cell_of(at + Eigen::Vector3d::Constant(gates_.radius_m), kCellSize);
+  const Eigen::Vector3i low = cell_at(at - Eigen::Vector3d::Constant(gates_.radius_m), kCellSize);
+  const Eigen::Vector3i high = cell_at(at + Eigen::Vector3d::Constant(gates_.radius_m), kCellSize);
   int count = 0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();

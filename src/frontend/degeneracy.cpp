@@ -25,6 +25,11 @@ void append_orthonormal(std::vector<Vector6d>& list, Vector6d direction) {
   if (direction.norm() > 1e-6) list.push_back(direction.normalized());
 }
 
+/// The share of a direction's sensitivity that errors of the normals do not explain, as a weight of its information.
+double weight_of(double value, double noise) {
+  return value > 0.0 ? std::sqrt(std::max(1.0 - noise / value, 0.0)) : 0.0;
+}
+
 }  // namespace
 
 ScaledSensitivity::ScaledSensitivity(const Matrix6d& sensitivity, const Matrix6d& normal_noise, double length)
@@ -50,7 +55,7 @@ DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivi
     if (analysis.blind[i]) {
       append_orthonormal(analysis.degenerate, without_small_turn(direction));
     } else {
-      observed += std::sqrt(std::max(1.0 - noise / value, 0.0)) * direction * direction.transpose();
+      observed += weight_of(value, noise) * direction * direction.transpose();
     }
   }
   analysis.degenerate_directions = static_cast<int>(analysis.degenerate.size());
@@ -58,12 +63,10 @@ DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivi
   Matrix6d rest = Matrix6d::Identity();
   Matrix6d doubtful = Matrix6d::Zero();
   for (const Vector6d& direction : analysis.degenerate) {
-    const double value = direction.dot(scan.value * direction);
-    const double noise = direction.dot(scan.noise * direction);
-    const bool unseen = value < min_sensitivity || value <= 0.0;
-    const double kept = unseen ? 0.0 : std::sqrt(std::max(1.0 - noise / value, 0.0));
-    doubtful += kept * direction * direction.transpose();
     rest -= direction * direction.transpose();
+    const double value = direction.dot(scan.value * direction);
+    if (value < min_sensitivity) continue;
+    doubtful += weight_of(value, direction.dot(scan.noise * direction)) * direction * direction.transpose();
   }
   observed = (rest * observed * rest).eval();
 

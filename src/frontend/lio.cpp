@@ -192,25 +192,12 @@ ScanResult Lio::process(const Scan& scan) {
   match.stats.points = selection.in_range;
   filter_ = match.filter;
   if (last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs) keep_biases(predicted);
-  if (match.stats.applied()) {
-    const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable);
-    if (update.ok) cautious_ = update.covariance;
-  }
-  if (match.stats.applied()) ++applied_scans_;
-  scans_without_correction_ = match.stats.applied() ? 0 : scans_without_correction_ + 1;
+  count_correction(match);
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
   match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(selection.scan, match.stats.reason, cloud, sparse);
-  // Standing shows nothing new. A map that went on taking scans would follow whatever the pose does by little and
-  // little.
-  const bool is_settled = match.stats.standing && match.stats.applied() && map_.scans() >= kScansOfASettledMap;
-  if (!is_settled) {
-    if (match.stats.applied()) {
-      drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans * match.inflation);
-    }
-    grow_map(cloud, match.stats.reason);
-  }
+  enter_map(cloud, match);
 
   ScanResult result;
   result.stats = match.stats;
@@ -224,9 +211,10 @@ ScanResult Lio::process(const Scan& scan) {
   result.covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
   result.covariance.block<3, 3>(kPosition, kPosition) +=
       tilt_of_blind_shifts(match.degeneracy, result.covariance.block<3, 3>(kPosition, kPosition));
-  if (velocity_known_)
-    result.keyframe =
-        keyframer_.add_scan({filter_.nominal, result.covariance}, match.information_body, std::move(sparse));
+  if (velocity_known_) {
+    const FilterState published{filter_.nominal, result.covariance};
+    result.keyframe = keyframer_.add_scan(published, match.information_body, std::move(sparse));
+  }
   result.cloud = std::move(cloud);
   return result;
 }
@@ -251,6 +239,17 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
   return result;
 }
 
+void Lio::count_correction(const MatchResult& match) {
+  if (!match.stats.applied()) {
+    ++scans_without_correction_;
+    return;
+  }
+  ++applied_scans_;
+  scans_without_correction_ = 0;
+  const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable);
+  if (update.ok) cautious_ = update.covariance;
+}
+
 void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,
                               std::vector<CloudPoint>& sparse) {
   if (velocity_known_) return;
@@ -263,6 +262,14 @@ void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<C
   } else if (is_contradiction(reason)) {
     map_.clear();
   }
+}
+
+/// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.
+void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match) {
+  const bool applied = match.stats.applied();
+  if (applied && match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
+  if (applied) drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans * match.inflation);
+  grow_map(cloud, match.stats.reason);
 }
 
 void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {

@@ -70,6 +70,8 @@ class Lio {
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse);
+  void count_correction(const MatchResult& match);
+  void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason);
   void follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,
                            std::vector<CloudPoint>& sparse);

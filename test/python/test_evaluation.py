@@ -10,7 +10,7 @@ import pytest
 from ignis.errors import InputError
 from ignis.evaluate import Row, Variant, table
 from ignis.evaluation.consistency import band, nees_of
-from ignis.evaluation.drives import Simulation, _changed_scene
+from ignis.evaluation.drives import Simulation, changed_scene
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, write_tum
 
 
@@ -71,13 +71,13 @@ def test_changed_scene_keeps_its_geometry_within_reach(tmp_path: Path) -> None:
     scenes.mkdir()
     (scenes / "hall.json").write_text("{}")
     (scenes / "quick.json").write_text('{"geometry": "hall.json", "imu": {"gyro_bias_walk": 1}}')
-    changed = _changed_scene(scenes / "quick.json", ["imu.gyro_bias_walk=2", "lidar.range_noise_m=0.02"], work)
+    changed = changed_scene(scenes / "quick.json", ["imu.gyro_bias_walk=2", "lidar.range_noise_m=0.02"], work)
     content = json.loads(changed.read_text())
     assert (changed.parent / content["geometry"]).resolve() == (scenes / "hall.json").resolve()
     assert content["imu"]["gyro_bias_walk"] == 2
     assert content["lidar"] == {"range_noise_m": 0.02}
     with pytest.raises(InputError, match=r"section\.key=value"):
-        _changed_scene(scenes / "quick.json", ["nonsense"], work)
+        changed_scene(scenes / "quick.json", ["nonsense"], work)
 
 
 def test_table_lists_drives_in_order_and_means_over_seeds() -> None:

@@ -2,13 +2,12 @@
 """The drives of a benchmark: one simulated log per scene and seed, and the same data in the form that peers take."""
 
 import json
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ignis.errors import InputError
+from ignis.evaluation.drives import simulate
 from ignis.logs import PartAssembler, joined_arrays, read_log
 from ignis.mounts import R_OURS_FROM_FLU
 
@@ -36,12 +35,7 @@ def make_drive(l1_sim: Path, scene: Path, seed: int, config: Path, folder: Path)
     drive = Drive(scene.stem, sensor_of(scene), seed, out / "drive.lcm", out / "drive.npz", out / "ground_truth.tum")
     if drive.arrays.exists():
         return drive
-    out.mkdir(parents=True, exist_ok=True)
-    command = [l1_sim, "--scene", scene, "--seed", seed, "--config", config]
-    command += ["--log", drive.log, "--ground-truth", drive.truth]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise InputError(f"l1_sim failed on {scene}: {done.stderr.strip()}")
+    simulate(l1_sim, scene, seed, config, drive.log, drive.truth)
     _write_arrays(drive.log, drive.arrays)
     return drive
 

@@ -25,22 +25,27 @@ class Simulation:
         return f"{self.scene}_{self.seed}"
 
 
-def simulate(l1_sim: Path, scene: Path, seed: int, config: Path, changes: list[str], folder: Path) -> Simulation:
-    """Simulates the drive unless an earlier run left it there complete."""
-    variant = _changed_scene(scene, changes, folder)
+def simulate(l1_sim: Path, scene: Path, seed: int, config: Path, log: Path, truth: Path) -> None:
+    """Drives a scene into an LCM log with ground truth beside it; the truth appears once both are complete."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    partial = truth.with_suffix(".partial")
+    command = [l1_sim, "--scene", scene, "--seed", seed, "--config", config]
+    run_quietly([*command, "--log", log, "--ground-truth", partial])
+    partial.rename(truth)
+
+
+def simulated(l1_sim: Path, scene: Path, seed: int, config: Path, changes: list[str], folder: Path) -> Simulation:
+    """The drive of a scene with changes, made unless an earlier run left it there complete."""
+    variant = changed_scene(scene, changes, folder)
     out = folder / f"{variant.stem}_{seed}"
     simulation = Simulation(scene.stem, seed, out / "drive.lcm", out / "ground_truth.tum")
-    if simulation.truth.exists():
-        return simulation
-    out.mkdir(parents=True, exist_ok=True)
-    partial = simulation.truth.with_suffix(".partial")
-    command = [l1_sim, "--scene", variant, "--seed", seed, "--config", config]
-    run_quietly([*command, "--log", simulation.log, "--ground-truth", partial])
-    partial.rename(simulation.truth)
+    if not simulation.truth.exists():
+        simulate(l1_sim, variant, seed, config, simulation.log, simulation.truth)
     return simulation
 
 
-def _changed_scene(scene: Path, changes: list[str], folder: Path) -> Path:
+def changed_scene(scene: Path, changes: list[str], folder: Path) -> Path:
+    """A scene file with "section.key=value" set; the scene itself when there is nothing to change."""
     if not changes:
         return scene
     content = json.loads(scene.read_text())
