@@ -131,9 +131,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
         def run(drive: tuple[str, int]) -> list[Row]:
             scene = _CHECKOUT / "config" / "scenes" / f"{drive[0]}.json"
             inputs = arguments.out / "inputs"
-            simulation = simulated(
-                binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, inputs
-            )
+            simulation = simulated(binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, inputs)
             return [_replay(simulation, v, arguments.config, arguments.out / "runs", binaries) for v in variants]
 
         for done in concurrent.futures.as_completed([pool.submit(run, drive) for drive in drives]):
