@@ -73,7 +73,8 @@ DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivi
   Vector6d scale = Vector6d::Ones();
   scale.head<3>().setConstant(scan.length_m);
   const Vector6d inverse_scale = scale.cwiseInverse();
-  analysis.weighting = inverse_scale.asDiagonal() * (observed + doubtful) * scale.asDiagonal();
+  analysis.doubtful = inverse_scale.asDiagonal() * doubtful * scale.asDiagonal();
+  analysis.blind_part = inverse_scale.asDiagonal() * (Matrix6d::Identity() - rest) * scale.asDiagonal();
   analysis.projector = inverse_scale.asDiagonal() * observed * scale.asDiagonal();
   return analysis;
 }

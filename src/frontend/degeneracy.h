@@ -33,11 +33,13 @@ struct DegeneracyAnalysis {
   std::array<bool, 6> blind{};              ///< which of them are degenerate
   /// Degenerate unit directions in scaled coordinates: (length x attitude, position).
   std::vector<Vector6d> degenerate;
-  /// What corrects the state: keeps a direction of the pose error by the square root of the share of its sensitivity
-  /// that is no noise. A degenerate direction with a little true structure is so still used for what it is worth.
-  Matrix6d weighting = Matrix6d::Identity();
-  /// What the covariance may rely on: the same, and nothing along degenerate directions.
+  /// What a scan may be relied on for: keeps a direction of the pose error by the square root of the share of its
+  /// sensitivity that is no noise, and nothing along degenerate directions.
   Matrix6d projector = Matrix6d::Identity();
+  /// The same share along degenerate directions alone: a bit of true structure among much noise, worth a correction of
+  /// the state but not a claim to know it.
+  Matrix6d doubtful = Matrix6d::Zero();
+  Matrix6d blind_part = Matrix6d::Zero();  ///< projects a pose error on the degenerate directions
 };
 
 /// `sensitivity` is the mean of h h^T over the matched points, h = derivative of the point-to-plane distance; `noise`

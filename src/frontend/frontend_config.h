@@ -60,7 +60,7 @@ struct FrontendConfig {
   double degeneracy_threshold = 1e-5;
   double degeneracy_signal_to_noise = 1.6;
   int map_average_points = 1;
-  double map_drift = 4.0;
+  double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
   double imu_timeout_s = 0.5;
   double degraded_sigma_m = 0.15;
@@ -186,9 +186,8 @@ struct FrontendConfig {
         "IMU");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
-    visit.number(
-        "map_drift", self.map_drift, {0.0, 1000.0}, "1",
-        "factor on the variance, without inflation, that each scan leaves in the published covariance for good");
+    visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",
+                 "factor on the variance that each scan leaves in the published covariance for good");
     visit.number("wide_match_radius_m", self.wide_match_radius_m, {0.0, 10.0}, "m",
                  "neighbour radius for points that find too few within match_radius_m; 0: none");
     visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",

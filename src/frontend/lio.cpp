@@ -191,7 +191,7 @@ ScanResult Lio::process(const Scan& scan) {
   MatchResult match = correct(cloud, sparse);
   match.stats.points = selection.in_range;
   filter_ = match.filter;
-  if (last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs) keep_biases(predicted);
+  if (learns_nothing()) keep_biases(predicted);
   count_correction(match);
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
@@ -246,7 +246,7 @@ void Lio::count_correction(const MatchResult& match) {
   }
   ++applied_scans_;
   scans_without_correction_ = 0;
-  const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable);
+  const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable, match.considered);
   if (update.ok) cautious_ = update.covariance;
 }
 
@@ -268,7 +268,7 @@ void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<C
 void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match) {
   const bool applied = match.stats.applied();
   if (applied && match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
-  if (applied) drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans * match.inflation);
+  if (applied) drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans);
   grow_map(cloud, match.stats.reason);
 }
 
@@ -309,6 +309,9 @@ void Lio::coast_to(Utime utime) {
   }
 }
 
+/// True while the filter's own samples, clipped or coasting, would teach the biases what is not so.
+bool Lio::learns_nothing() const { return last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs; }
+
 /// Undoes what a scan did to the biases. Their correlations with the rest are given up, which only widens the rest.
 void Lio::keep_biases(const FilterState& predicted) {
   filter_.nominal.gyro_bias = predicted.nominal.gyro_bias;
@@ -325,6 +328,7 @@ void Lio::use_standstill(ScanStats& stats) {
   const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_);
   if (!standstill) return;
   stats.standing = true;
+  if (learns_nothing()) return;
   // Windows that overlap share the noise of their samples.
   if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2) return;
   last_standstill_ = filter_.nominal.utime;

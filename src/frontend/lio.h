@@ -80,6 +80,7 @@ class Lio {
   void coast_to(Utime utime);
   void use_standstill(ScanStats& stats);
   [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan) const;
+  [[nodiscard]] bool learns_nothing() const;
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
   void start(const FilterState& first);

@@ -29,8 +29,8 @@ class MapDrift {
   /// Begins with what gravity says about the attitude: body axes, [rad^2].
   void begin(const Eigen::Matrix3d& attitude_covariance_body, const Pose& T_odom_body);
 
-  /// A scan entered the map at a pose that is known in the map with `covariance` (order of ErrorBlock). Where that is
-  /// inflated, `age_scans` is the age times the inflation.
+  /// A scan entered the map at a pose that is known in the map with `covariance` (order of ErrorBlock), which is
+  /// made of points of the age `age_scans` on average.
   void add_scan(const Matrix15d& covariance, const Pose& T_odom_body, double age_scans);
 
   /// The filter's covariance plus this one, at a pose.

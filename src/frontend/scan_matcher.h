@@ -23,8 +23,9 @@ struct MatchResult {
   Matrix6d information_body = Matrix6d::Zero();
   /// The same as sum over the points, order and axes of PoseInformation: what the covariance may rely on.
   PoseInformation reliable;
+  /// Projects on what `reliable` must not correct: position along directions that it leaves open, and velocity with it.
+  Matrix15d considered = Matrix15d::Zero();
   DegeneracyAnalysis degeneracy;  ///< which directions that leaves open
-  double inflation = 1.0;         ///< of the residuals' variance that went into it
   double map_age_scans = 1.0;     ///< mean age of the map points that the scan met
 };
 
@@ -64,6 +65,8 @@ class ScanMatcher {
   [[nodiscard]] double point_variance(const Pose& pose) const;
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;
+  [[nodiscard]] Matrix15d considered() const;
+  [[nodiscard]] bool use_doubtful(FilterState& iterate) const;
   [[nodiscard]] bool iterate(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
                              const LocalMap& map, MatchResult& result);
   [[nodiscard]] ScanReason judge(const FilterState& predicted, const Assessment& assessment,
@@ -74,6 +77,7 @@ class ScanMatcher {
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;
+  double map_noise_ = 1.0;  ///< factor on the variance of a point for the map's own errors
   double mean_range_ = 1.0;
   double mean_map_scan_ = 0.0;  ///< number of the scan that a met map point comes from
 };

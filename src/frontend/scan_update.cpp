@@ -16,7 +16,7 @@ PoseInformation PoseInformation::projected(const Matrix6d& projector) const {
 }
 
 UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
-                              const PoseInformation& constraints) {
+                              const PoseInformation& constraints, const Matrix15d& considered) {
   // The prior's error in coordinates of the iterate's tangent space: only attitude is curved.
   Matrix15d to_iterate = Matrix15d::Identity();
   to_iterate.block<3, 3>(kAttitude, kAttitude) = so3::right_jacobian(deviation.segment<3>(kAttitude));
@@ -33,7 +33,10 @@ UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d
   update.covariance = P - P6 * M * P6.transpose();
   update.ok = make_symmetric(update.covariance);
   const Vector15d restored = d - P6 * (M * d.head<6>());
-  update.step = -(update.covariance.leftCols<6>() * constraints.gradient) - restored;
+  const Vector15d full_step = -(update.covariance.leftCols<6>() * constraints.gradient) - restored;
+  // The gain K becomes (I - C) K; Joseph's form of the covariance for it is P - G + C G C^T with G = P6 M P6^T.
+  update.step = full_step - considered * full_step;
+  update.covariance += considered * (P - update.covariance) * considered.transpose();
   update.ok = update.ok && update.step.allFinite();
   return update;
 }

@@ -34,8 +34,13 @@ struct UpdateStep {
 ///   M = (I + A P66)^-1 A,  P+ = P - P6 M P6^T,  step = -P+6 b - (d - P6 M d6).
 /// Equal to processing the points one at a time with scalar Kalman gains.
 /// Equations: W. Xu, F. Zhang, "FAST-LIO", RA-L 2021, eqs. 16-20, rearranged with the matrix inversion lemma.
+///
+/// `considered` projects on the part of the error that the constraints must not correct although it is correlated with
+/// what they observe; its uncertainty stays, and so does what the rest owes to it (S. F. Schmidt, "Application of
+/// state-space methods to navigation problems", Advances in Control Systems 3, 1966).
 [[nodiscard]] UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
-                                            const PoseInformation& constraints);
+                                            const PoseInformation& constraints,
+                                            const Matrix15d& considered = Matrix15d::Zero());
 
 /// How far a scan lies from the prediction.
 struct Innovation {

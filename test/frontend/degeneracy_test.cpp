@@ -39,6 +39,20 @@ TEST(Degeneracy, AWeakDirectionLosesTheShareThatIsNoise) {
   EXPECT_NEAR(kept(4, 4), 1.0 / 3.0, 1e-12);
 }
 
+TEST(Degeneracy, ABlindDirectionIsCutOutOfTheReliablePartAndItsTrueShareIsDoubtful) {
+  Matrix6d sensitivity = Matrix6d::Identity() / 3.0;
+  sensitivity(5, 5) = 0.1;
+  Matrix6d noise = Matrix6d::Zero();
+  noise(5, 5) = 0.08;
+  const DegeneracyAnalysis analysis = analyse_degeneracy(sensitivity, noise, {2.0, 1e-5, 1.6});
+  ASSERT_EQ(analysis.degenerate_directions, 1);
+  EXPECT_LT((analysis.projector * Vector6d::Unit(5)).norm(), 1e-12);
+  const Matrix6d kept = analysis.doubtful.transpose() * sensitivity * analysis.doubtful;
+  EXPECT_NEAR(kept(5, 5), 0.1 - 0.08, 1e-12);
+  EXPECT_LT(kept.topLeftCorner(5, 5).norm(), 1e-12);
+  EXPECT_LT((analysis.blind_part - Vector6d::Unit(5) * Vector6d::Unit(5).transpose()).norm(), 1e-12);
+}
+
 TEST(Degeneracy, NamesADirectionByItsLargerPartAndWithoutASign) {
   DegeneracyAnalysis analysis;
   EXPECT_EQ(describe(analysis), "");

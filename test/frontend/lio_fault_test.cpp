@@ -124,6 +124,20 @@ TEST(Fault_F3, AClippedAxisTeachesTheBiasesNothing) {
   EXPECT_LT(run.error_at_end(), 0.3);
 }
 
+TEST(Fault_F3, StandingAfterAClippedSampleTeachesTheBiasesNothingEither) {
+  Drive input = test::simulate(test::furnished_hall(), test::straight_drive(20.0, 0.5), 12.0, Sensors{}, 3);
+  auto clipped = sample_at(input, 8.0);
+  clipped->accel.x() = 25.0;
+  clipped->saturated = true;
+  const Watched run(input);
+  const auto state_at = [&](double seconds) {
+    const Utime utime = input.imu.front().utime + to_micros(seconds);
+    return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
+  };
+  EXPECT_EQ((state_at(8.95).gyro_bias - state_at(8.05).gyro_bias).norm(), 0.0);
+  EXPECT_GT((state_at(9.6).gyro_bias - state_at(8.05).gyro_bias).norm(), 0.0) << "one second later it learns again";
+}
+
 TEST(Fault_F4, PointsThatAreNoNumbersLeaveTheResultBitIdentical) {
   Drive input = drive();
   constexpr float kBad[] = {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30F};

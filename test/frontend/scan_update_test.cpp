@@ -175,5 +175,36 @@ TEST(Degeneracy, ProjectedInformationLeavesThePriorAloneThere) {
   EXPECT_NEAR(update.step[3], -0.08, 1e-12);
 }
 
+TEST(ScanUpdate, ConsideredPartKeepsItsPlaceAndTheCovarianceIsThatOfTheGainWithoutIt) {
+  std::mt19937 random(6);
+  const Matrix15d P = random_covariance(random);
+  const std::vector<ScalarConstraint> constraints = random_constraints(random, 30);
+  Matrix15d considered = Matrix15d::Zero();
+  const Eigen::Vector3d along = Eigen::Vector3d(0.3, -0.2, 0.9).normalized();
+  considered.block<3, 3>(kPosition, kPosition) = along * along.transpose();
+  considered.block<3, 3>(kVelocity, kVelocity) = along * along.transpose();
+  const UpdateStep update = information_update(P, Vector15d::Zero(), summed(constraints), considered);
+
+  // All constraints at once with an explicit gain, and Joseph's form, which holds for any gain.
+  const auto count = static_cast<Eigen::Index>(constraints.size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(count, 15);
+  Eigen::MatrixXd R = Eigen::MatrixXd::Zero(count, count);
+  Eigen::VectorXd z(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const ScalarConstraint& constraint = constraints[static_cast<std::size_t>(i)];
+    H.block<1, 6>(i, 0) = constraint.h.transpose();
+    R(i, i) = constraint.variance;
+    z[i] = constraint.z;
+  }
+  const Eigen::MatrixXd gain =
+      (Matrix15d::Identity() - considered) * P * H.transpose() * (H * P * H.transpose() + R).inverse();
+  const Matrix15d kept = Matrix15d::Identity() - gain * H;
+  const Matrix15d expected = kept * P * kept.transpose() + gain * R * gain.transpose();
+  ASSERT_TRUE(update.ok);
+  EXPECT_LT((update.covariance - expected).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((update.step + gain * z).norm(), 1e-9);
+  EXPECT_LT(std::abs(along.dot(update.step.segment<3>(kPosition))), 1e-12);
+}
+
 }  // namespace
 }  // namespace ignis
