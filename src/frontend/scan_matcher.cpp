@@ -64,7 +64,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
   result.stats.degenerate_directions = degeneracy_.degenerate_directions;
   result.stats.unobserved = describe(degeneracy_);
   result.degeneracy = degeneracy_;
-  result.map_age_scans = map.scans() + 1.0 - mean_map_scan_;
+  result.map_age_scans = (map.scans() + 1.0 - mean_map_scan_) * map_noise_;
   result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
   if (!result.stats.applied()) {
     result.filter = predicted;

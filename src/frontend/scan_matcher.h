@@ -26,7 +26,9 @@ struct MatchResult {
   /// Projects on what `reliable` must not correct: position along directions that it leaves open, and velocity with it.
   Matrix15d considered = Matrix15d::Zero();
   DegeneracyAnalysis degeneracy;  ///< which directions that leaves open
-  double map_age_scans = 1.0;     ///< mean age of the map points that the scan met
+  /// Mean age of the map points that the scan met. Times the factor by which the errors of a young map widened the
+  /// covariance: all its scans share those, so that what one more of them adds is the part without.
+  double map_age_scans = 1.0;
 };
 
 /// Corrects a predicted state by matching deskewed points against planes of the local map: assessment, quality gate,

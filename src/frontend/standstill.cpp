@@ -15,7 +15,7 @@ constexpr double kMaxVelocitySigma = 0.1;  // m/s: above it the filter cannot te
 constexpr double kSigmas = 3.0;
 constexpr std::ptrdiff_t kMinSamples = 4;  // that a quiet window needs
 constexpr Utime kLongWindowUs = 9 * (kMicrosPerSecond / 10);
-constexpr Utime kDelayUs = kMicrosPerSecond / 10;  // between standing and the correction that it leads to
+constexpr Utime kDelayUs = 2 * (kMicrosPerSecond / 10);  // between standing and the correction that it leads to
 
 struct Quiet {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< [rad/s] mean

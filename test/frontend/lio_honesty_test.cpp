@@ -26,7 +26,7 @@ Nees nees_of(std::uint32_t seed) {
   sensors.range_sigma = 0.02;
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  for (double& bias : sensors.accel_bias) bias = 0.06 * normal(random);
+  for (double& bias : sensors.accel_bias) bias = test::tuned_config().accel_bias_sigma * normal(random);
   const Drive drive =
       test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 20.0, sensors, seed);
   const test::LioRun run = test::run_lio(test::tuned_config(), drive);
