@@ -89,7 +89,7 @@ def words(judged: list[dict[str, Any]], gains: dict[str, Any]) -> list[str]:
 def _sentence(title: str, gain: dict[str, Any], unit: str) -> str:
     change = (
         f"{title}: {gain['eskf_mean']:.3f} {unit} with ESKF only, {gain['smoothed_mean']:.3f} {unit} smoothed, "
-        f"gain {gain['gain_mean']:+.3f} {unit}"
+        f"gain {gain['gain_mean']:+.4f} {unit}"
     )
     if gain["interval"] is None:
         share = gain["gain_mean"] / gain["eskf_mean"] if gain["eskf_mean"] > 0.0 else 0.0
@@ -97,7 +97,7 @@ def _sentence(title: str, gain: dict[str, Any], unit: str) -> str:
             return f"Smoothing made no difference to {change}."
         return f"Smoothing {'helped' if share > 0.0 else 'did not help, it cost accuracy'}. {change} ({share:+.0%})."
     low, high = gain["interval"]
-    band = f"{LEVEL:.0%} interval {low:+.3f} to {high:+.3f} over {gain['drives']} drives"
+    band = f"{LEVEL:.0%} interval {low:+.4f} to {high:+.4f} over {gain['drives']} drives"
     if low > 0.0:
         return f"Smoothing helped. {change} ({band}; better in {gain['better_in']})."
     if high < 0.0:

@@ -78,7 +78,7 @@ def run_table(result: dict[str, Any]) -> str:
 
 def runs_table(results: list[dict[str, Any]]) -> str:
     """Several runs: a row an estimate, and the mean over the runs."""
-    width = max(len(_short_name(result)) for result in results) + 1
+    width = max(4, *(len(_short_name(result)) for result in results)) + 1
     lines = [f"  {'':{width}}{'':12}" + "".join(f"{title:>11}" for title in _SHORT_TITLES) + f"{'loops':>7}"]
     for result in results:
         for name, figures in result["trajectories"].items():

@@ -163,7 +163,7 @@ def biases(seconds: NDArray[np.float64], columns: Mapping[str, NDArray[np.float6
 def bars(groups: Mapping[str, Mapping[str, float]], title: str, unit: str) -> str:
     """One group of bars a key, one bar an estimate."""
     labels = list(dict.fromkeys(label for group in groups.values() for label in group))
-    figure, axes = pyplot.subplots(figsize=(max(4.5, 1.2 + 0.5 * len(groups) * len(labels)), 3.6), layout="constrained")
+    figure, axes = pyplot.subplots(figsize=(max(5.6, 1.2 + 0.5 * len(groups) * len(labels)), 3.6), layout="constrained")
     figure.suptitle(title, fontsize=11)
     width = 0.8 / max(len(labels), 1)
     for index, label in enumerate(labels):
@@ -178,4 +178,22 @@ def bars(groups: Mapping[str, Mapping[str, float]], title: str, unit: str) -> st
     _prepared(axes, "", unit)
     axes.grid(axis="x", visible=False)
     axes.legend(fontsize=9)
+    return svg(figure)
+
+
+def heat(
+    cells: Sequence[Sequence[float]], rows: Sequence[str], columns: Sequence[str], names: tuple[str, str], title: str
+) -> str:
+    """A table in colours; NaN where there is nothing."""
+    figure, axes = pyplot.subplots(figsize=(2.2 + 0.9 * len(columns), 1.8 + 0.6 * len(rows)), layout="constrained")
+    figure.suptitle(title, fontsize=11)
+    values = np.array(cells, dtype=float)
+    axes.imshow(values, cmap="viridis_r", aspect="auto")
+    middle = (np.nanmin(values) + np.nanmax(values)) / 2.0
+    for (row, column), value in np.ndenumerate(values):
+        colour = "white" if value > middle else "black"
+        axes.text(column, row, "-" if np.isnan(value) else f"{value:.4f}", ha="center", va="center", color=colour)
+    axes.set_xticks(range(len(columns)), list(columns))
+    axes.set_yticks(range(len(rows)), list(rows))
+    axes.set(xlabel=names[1], ylabel=names[0])
     return svg(figure)
