@@ -104,12 +104,12 @@ void ReplayInput::count_missing() {
     imu_t imu;
     scan_t scan;
     if (entry.is_scan && messages::decode_checked(entry.data, scan)) {
-      inventory_.missing_scans += missed(entry.utime, scan_sequence.observe(scan.sequence), "scans");
+      inventory_.missing_scans += missed(entry.utime, scan_sequence.observe(scan.sequence), "of L1_SCAN");
       const std::int64_t incomplete = assembler.incomplete();
       (void)assembler.add(scan);
-      missed(entry.utime, assembler.incomplete() - incomplete, "scans with a part");
+      missed(entry.utime, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
     } else if (!entry.is_scan && messages::decode_checked(entry.data, imu)) {
-      inventory_.missing_imu += missed(entry.utime, imu_sequence.observe(imu.sequence), "IMU samples");
+      inventory_.missing_imu += missed(entry.utime, imu_sequence.observe(imu.sequence), "of L1_IMU");
     }
   }
   inventory_.incomplete_scans = assembler.incomplete();

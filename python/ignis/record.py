@@ -74,8 +74,8 @@ class Recording:
             re.compile(options.channels)
         except re.error as error:
             raise InputError(f"--channels {options.channels}: not a regular expression: {error}") from None
-        if options.split_mb is not None and not 0.1 <= options.split_mb <= 1e6:
-            raise InputError(f"--split-mb {options.split_mb:g}: allowed is 0.1 to 1000000")
+        if options.split_mb is not None and not 1.0 <= options.split_mb <= 1e6:
+            raise InputError(f"--split-mb {options.split_mb:g}: allowed is 1 to 1000000 (the logger counts whole MB)")
         if not self.output.parent.is_dir():
             raise InputError(f"the folder {self.output.parent} does not exist; make it first")
         existing = [path for path in (self.output, self.file(0)) if path.exists()]
@@ -104,7 +104,8 @@ class Recording:
         if CONFIG_CHANNEL not in options.channels and options.channels != ".*":
             command[command.index(options.channels)] = f"({options.channels})|{CONFIG_CHANNEL}"
         if options.split_mb is not None:
-            command += ["--increment", f"--split-mb={options.split_mb:g}"]
+            # The long form, --increment, swallows the next argument (LCM 1.5.3).
+            command += ["-i", f"--split-mb={options.split_mb:g}"]
         elif options.force:
             command.append("--force")
         return [*command, str(self.output)]
@@ -129,6 +130,7 @@ class Recording:
             self._number += 1
             self.tail.follow(self.file(self._number))
             self.tail.update()
+            self.publish_config()  # Each file can be replayed alone.
 
     def files(self) -> list[Path]:
         return [self.file(number) for number in range(self._number + 1) if self.file(number).exists()]

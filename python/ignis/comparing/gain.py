@@ -75,9 +75,7 @@ def words(judged: list[dict[str, Any]], gains: dict[str, Any]) -> list[str]:
     loops = [run["loops_kept"] for run in judged if run["loops_kept"] is not None]
     if loops and not any(loops):
         where = "this drive" if len(loops) == 1 else "any of these drives"
-        sentences.append(
-            f"No loop was kept in {where}: without loops, smoothing adds next to nothing to a good filter."
-        )
+        sentences.append(f"No loop was kept in {where}: without loops, smoothing changes positions but little.")
     if len(judged) < _FEWEST:
         sentences.append(
             f"{len(judged)} drive{'s are' if len(judged) > 1 else ' is'} too few for a confidence interval; "

@@ -21,11 +21,11 @@ from ignis.mounts import Extrinsics
 from ignis.progress import Progress
 
 _READER = Path(__file__).with_name("ouster_reader.py")
-_STANDARD_GRAVITY = 9.80665
 _PCAP_MAGICS = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d", b"\x0a\x0d\x0d\x0a")
 # [m] the inertial unit sits this close to where the configuration has it, or the user hears of it.
 _MOUNT_TOLERANCE_M = 0.05
-_GYRO_LIMIT_DEG_S = 2000.0
+# [rad/s] 2000 deg/s, the widest range of the sensors.
+_GYRO_LIMIT = 34.91
 
 
 def is_packet_capture(head: bytes) -> bool:
@@ -53,11 +53,11 @@ def import_packets(capture: Path, metadata: Path, recorder: Recorder, extrinsics
     """Hands a capture to the recorder; returns remarks for the user."""
     requirements = Path(os.environ.get("IGNIS_CHECKOUT", ".")) / "packaging" / "ouster-requirements.txt"
     python = environment_python("ouster", requirements, default_cache())
-    # The environment must not see our packages, whose versions the SDK excludes.
+    # The SDK must see neither our packages, whose versions it excludes, nor (-P) the modules beside the reader.
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     with tempfile.TemporaryFile() as complaints:
         reader = subprocess.Popen(
-            [python, _READER, capture, metadata], stdout=subprocess.PIPE, stderr=complaints, env=environment
+            [python, "-P", _READER, capture, metadata], stdout=subprocess.PIPE, stderr=complaints, env=environment
         )
         assert reader.stdout is not None
         try:
@@ -92,13 +92,20 @@ def _take_all(stream: IO[bytes], recorder: Recorder, extrinsics: Extrinsics, cap
     progress.close()
     remarks = [
         f"{about['product']}, {about['beams']} beams, {about['columns']} columns; a point has its column's stamp",
-        "accelerations in g and rates in deg/s, as the SDK gives them; stamps of the sensor's clock",
+        "accelerations in m/s^2 and rates in rad/s, as the SDK gives them; stamps of the sensor's clock",
     ]
     return remarks + _mount_remarks(T_sensor_imu[:3, 3] * 1e-3, extrinsics)
 
 
+class _Pipe:
+    """A stream that NumPy does not take for a file: from files it reads by position, which a pipe has not."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self.read = stream.read
+
+
 def _array(stream: IO[bytes]) -> np.ndarray:
-    array: np.ndarray = np.load(stream, allow_pickle=False)
+    array: np.ndarray = np.lib.format.read_array(_Pipe(stream), allow_pickle=False)
     return array
 
 
@@ -106,10 +113,10 @@ def _add_inertial(
     instants: np.ndarray, accel: np.ndarray, gyro: np.ndarray, R_sensor_imu: np.ndarray, recorder: Recorder
 ) -> None:
     for utime, a, w in zip(instants.tolist(), accel, gyro, strict=True):
-        if np.abs(w).max(initial=0.0) > _GYRO_LIMIT_DEG_S:
+        if np.abs(w).max(initial=0.0) > _GYRO_LIMIT:
             recorder.dropped["inertial samples beyond the sensor's range"] += 1
             continue
-        recorder.add_imu(utime, R_sensor_imu @ np.radians(w), R_sensor_imu @ (a * _STANDARD_GRAVITY))
+        recorder.add_imu(utime, R_sensor_imu @ w, R_sensor_imu @ a)
 
 
 def _mount_remarks(imu_in_sensor_m: np.ndarray, extrinsics: Extrinsics) -> list[str]:
@@ -121,5 +128,5 @@ def _mount_remarks(imu_in_sensor_m: np.ndarray, extrinsics: Extrinsics) -> list[
     expected: Any = np.round(extrinsics.lidar.translation() + offset, 4).tolist()
     return [
         f"WARNING: by the metadata the inertial unit sits at {expected} m in the body frame, the configuration has "
-        f"extrinsics.imu.translation_m at {extrinsics.imu.translation().tolist()}"
+        f"extrinsics.imu.translation_m at {np.round(extrinsics.imu.translation(), 4).tolist()}"
     ]

@@ -2,7 +2,7 @@
 """Runs in the environment of the Ouster SDK: a packet capture in, arrays out on the output stream.
 
 Knows nothing of our package. A line of JSON tells about the sensor; then follow records, a letter and arrays each:
-I: instants [us], accelerations [g], angular rates [deg/s], in the axes of the inertial unit.
+I: instants [us], accelerations [m/s^2], angular rates [rad/s], in the axes of the inertial unit.
 S: instants of the points [us], points in the sensor frame [m], reflectivity 0..255; one complete scan.
 Usage: ouster_reader.py CAPTURE METADATA
 """

@@ -108,7 +108,7 @@ def _remarks(run: Run) -> str:
                 )
             )
     if run.report["loops_kept"] == 0:
-        notes.append(html.note("No loop was kept: without one, smoothing adds next to nothing to a good filter."))
+        notes.append(html.note("No loop was kept: without one, smoothing changes positions but little."))
     return html.section("In words", *notes)
 
 

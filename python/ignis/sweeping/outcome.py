@@ -60,12 +60,12 @@ def _page(done: list[tuple[Task, Row]], keys: list[str], total: int) -> str:
         for task, row in done
     ]
     judged = [(task, row) for task, row in done if row.get(_JUDGED) is not None]
-    pieces = [charts.bars(_means(judged, key), f"mean ATE by {key}", "m") for key in keys]
+    pieces = [charts.bars(_means(judged, key), f"mean ATE by {key}", "m") for key in keys if judged]
     if len(keys) == 2 and judged:
         pieces.append(_grid(judged, keys))
     return html.document(
         "Sweep", lead,
-        [html.section("By parameter", html.side_by_side(*pieces) if judged and keys else ""),
+        [html.section("By parameter", html.side_by_side(*pieces) if pieces else ""),
          html.section("All replays", html.table(head, body))],
     )  # fmt: skip
 
