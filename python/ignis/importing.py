@@ -86,8 +86,8 @@ def import_recording(source: Path, output: Path, config: Path, choice: ImportCho
             remarks = l1_capture.import_capture(source, config, temporary)
         else:
             with Recorder(temporary, extrinsics) as recorder:
-                if kind == "kitti":
-                    remarks = kitti_raw.import_drive(kitti_raw.find_drive(source), recorder, extrinsics)
+                if (drive := kitti_raw.find_drive(source) if kind == "kitti" else None) is not None:
+                    remarks = kitti_raw.import_drive(drive, recorder, extrinsics)
                 elif kind == "ouster":
                     metadata = ouster.find_metadata(source, choice.metadata)
                     remarks = ouster.import_packets(source, metadata, recorder, extrinsics)

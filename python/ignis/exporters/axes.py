@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """From our axes (X right, Y up, Z back) to those of ROS (X forward, Y left, Z up): of bodies and worlds alike."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,10 +11,8 @@ from ignis.poses import Poses, Trajectory, quaternion_conjugate, quaternion_from
 
 _Q_ROS_FROM_OURS = quaternion_from_matrix(R_OURS_FROM_FLU.T)
 
-Vectors = NDArray[np.float64] | NDArray[np.float32]
 
-
-def vectors_to_ros(vectors: Vectors) -> Vectors:
+def vectors_to_ros(vectors: NDArray[Any]) -> NDArray[Any]:
     """(..., 3) coordinates; an exchange of axes, so no digit is lost."""
     return np.stack([-vectors[..., 2], -vectors[..., 0], vectors[..., 1]], axis=-1)
 

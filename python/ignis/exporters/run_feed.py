@@ -16,7 +16,8 @@ from ignis.logs import PartAssembler, joined_arrays, read_log
 from ignis.poses import Trajectory
 from ignis.run_folder import Run
 
-Action = tuple[int, Callable[[Sink, Stamp], None]]
+Telling = Callable[[Sink, Stamp], None]
+Action = tuple[int, Telling]
 
 
 def feed_run(run: Run, sink: Sink) -> None:
@@ -42,11 +43,26 @@ def feed_run(run: Run, sink: Sink) -> None:
         sink.cloud("/map", end, Cloud("map", in_ros, intensity.astype(np.float32)))
 
 
+def _pose(topic: str, frame: str, at: Placed) -> Telling:
+    return lambda sink, stamp: sink.pose(topic, stamp, frame, at)
+
+
+def _transform(parent: str, child: str, at: Placed) -> Telling:
+    return lambda sink, stamp: sink.transform(stamp, parent, child, at)
+
+
+def _text(level: Level, source: str, text: str) -> Telling:
+    return lambda sink, stamp: sink.text(stamp, level, source, text)
+
+
+def _cloud(topic: str, cloud: Cloud) -> Telling:
+    return lambda sink, stamp: sink.cloud(topic, stamp, cloud)
+
+
 def _poses(trajectory: Trajectory, topic: str, frame: str) -> Iterator[Action]:
     poses = trajectory.poses
     for utime, position, quaternion in zip(trajectory.utime.tolist(), poses.position, poses.quaternion, strict=True):
-        at = Placed(position, quaternion)
-        yield utime, lambda sink, stamp, at=at: sink.pose(topic, stamp, frame, at)
+        yield utime, _pose(topic, frame, Placed(position, quaternion))
 
 
 def _transforms(run: Run) -> Iterator[Action]:
@@ -54,10 +70,8 @@ def _transforms(run: Run) -> Iterator[Action]:
     odom = poses_to_ros(run.eskf.poses)
     correction = poses_to_ros(run.smoothed.poses) @ odom.inverse()
     for index, utime in enumerate(run.eskf.utime.tolist()):
-        body = Placed(odom.position[index], odom.quaternion[index])
-        yield utime, lambda sink, stamp, at=body: sink.transform(stamp, "odom", "body", at)
-        shift = Placed(correction.position[index], correction.quaternion[index])
-        yield utime, lambda sink, stamp, at=shift: sink.transform(stamp, "map", "odom", at)
+        yield utime, _transform("odom", "body", Placed(odom.position[index], odom.quaternion[index]))
+        yield utime, _transform("map", "odom", Placed(correction.position[index], correction.quaternion[index]))
 
 
 def _reasons(run: Run) -> Iterator[Action]:
@@ -67,8 +81,7 @@ def _reasons(run: Run) -> Iterator[Action]:
     ):
         text = "scans are applied" if applied else f"scan not applied: {reason}"
         if text != before:
-            level = Level.INFO if applied else Level.WARNING
-            yield utime, lambda sink, stamp, level=level, text=text: sink.text(stamp, level, "lio_frontend", text)
+            yield utime, _text(Level.INFO if applied else Level.WARNING, "lio_frontend", text)
         before = text
 
 
@@ -78,8 +91,8 @@ def _scans(log: Path, until: int) -> Iterator[Action]:
     for _, _, message in read_log(log, ("L1_SCAN",)):
         end = message.utime + message.duration_us
         if (whole := parts.add(message)) and end <= until:
-            cloud = cloud_of({k: v for k, v in joined_arrays(whole).items() if k != "dt_us"}, "body")
-            yield end, lambda sink, stamp, cloud=cloud: sink.cloud("/l1/scan", stamp, cloud)
+            arrays = {name: values for name, values in joined_arrays(whole).items() if name != "dt_us"}
+            yield end, _cloud("/l1/scan", cloud_of(arrays, "body"))
 
 
 def _graph(run: Run, sink: Sink, stamp: Stamp) -> None:

@@ -84,9 +84,9 @@ def _take_all(stream: IO[bytes], recorder: Recorder, extrinsics: Extrinsics, cap
     scans = 0
     while kind := stream.read(1):
         if kind == b"I":
-            _add_inertial(*(_array(stream) for _ in range(3)), T_sensor_imu[:3, :3], recorder)
+            _add_inertial(_array(stream), _array(stream), _array(stream), T_sensor_imu[:3, :3], recorder)
         else:
-            recorder.add_scan(*(_array(stream) for _ in range(3)))
+            recorder.add_scan(_array(stream), _array(stream), _array(stream))
             scans += 1
             progress.update(0.0, f"{scans} scans")
     progress.close()

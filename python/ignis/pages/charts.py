@@ -3,6 +3,7 @@
 
 import io
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -61,7 +62,7 @@ def from_above(
         axes.plot([], [], color="#2a8f5b", lw=1.6, label="loop")
     for label, trajectory in trajectories.items():
         p = trajectory.poses.position[_thinned(len(trajectory))]
-        wide = {"lw": 3.0, "alpha": 0.3} if label == TRUTH else {"lw": 1.2}
+        wide: dict[str, Any] = {"lw": 3.0, "alpha": 0.3} if label == TRUTH else {"lw": 1.2}
         axes.plot(p[:, 0], -p[:, 2], color=colour_of(label, list(trajectories)), label=label, **wide)
     first = next(iter(trajectories.values())).poses.position[0]
     axes.plot(first[0], -first[2], "D", color="#222222", ms=5, label="start")
@@ -78,7 +79,7 @@ def from_the_side(trajectories: Mapping[str, Trajectory]) -> str:
         p = trajectory.poses.position
         way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
         chosen = _thinned(len(p))
-        wide = {"lw": 3.0, "alpha": 0.3} if label == TRUTH else {"lw": 1.2}
+        wide: dict[str, Any] = {"lw": 3.0, "alpha": 0.3} if label == TRUTH else {"lw": 1.2}
         axes.plot(way[chosen], p[chosen, 1], color=colour_of(label, list(trajectories)), label=label, **wide)
     _prepared(axes, "way driven [m]", "Y, up [m]")
     axes.legend(fontsize=9)
