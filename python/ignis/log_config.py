@@ -42,7 +42,7 @@ def _config_at(view: mmap.mmap, at: int) -> dict[str, Any] | None:
         return None
     sync, _, _, name_length, data_length = _HEAD.unpack_from(view, at - _HEAD.size)
     begin = at + len(_NAME)
-    if sync != _SYNC or name_length != len(_NAME) or data_length < 2 or begin + data_length > len(view):
+    if sync != _SYNC or name_length != len(_NAME) or data_length < 2:
         return None
     try:
         config = json.loads(view[begin : begin + data_length])

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags made on the fly: a wall ahead, to the left and above, seen at rest, in each of the container formats."""
 
+import contextlib
+import sqlite3
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +114,7 @@ uint8[3] rsvd
 
 
 def write_livox_bag(folder: Path, form: str, package: str) -> Path:
-    """The same scene from a Livox driver, in a bag of the time before definitions were stored (version 8)."""
+    """The same scene from a Livox driver, an sqlite3 bag without its definitions, as before ROS 2 Iron."""
     messages = Messages(ros1=False)
     point, cloud = f"{package}/msg/CustomPoint", f"{package}/msg/CustomMsg"
     messages.store.register(get_types_from_msg(_LIVOX_POINT, point))
@@ -137,4 +139,8 @@ def write_livox_bag(folder: Path, form: str, package: str) -> Path:
         ]
         for ns, connection, raw in sorted(entries, key=lambda entry: entry[0]):
             writer.write(connection, ns, raw)
+    if form == "ros2":
+        (file,) = path.glob("*.db3")
+        with contextlib.closing(sqlite3.connect(file)) as database, database:
+            database.execute("DELETE FROM message_definitions")
     return path
