@@ -65,6 +65,7 @@ void LocalMap::clear() {
   table_.assign(kFirstCapacity, kFree);
   size_ = 0;
   scans_ = 0;
+  inserted_points_ = 0;
   has_slid_ = false;
 }
 
@@ -109,6 +110,7 @@ void LocalMap::rebuild_table(std::size_t capacity) {
 
 void LocalMap::insert(std::span<const Eigen::Vector3f> points_body, const Pose& T_odom_body, bool confirmed) {
   ++scans_;
+  inserted_points_ += std::ssize(points_body);
   const Eigen::Matrix3d R = T_odom_body.rotation.toRotationMatrix();
   for (const Eigen::Vector3f& point : points_body) {
     insert_point(R * point.cast<double>() + T_odom_body.translation, confirmed);

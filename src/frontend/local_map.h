@@ -45,6 +45,8 @@ class LocalMap {
 
   /// Scans inserted since the map was begun.
   [[nodiscard]] int scans() const { return scans_; }
+  /// Points of these scans.
+  [[nodiscard]] std::int64_t inserted_points() const { return inserted_points_; }
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
   /// All points, confirmed or not, in a fixed order.
@@ -82,6 +84,7 @@ class LocalMap {
   std::vector<std::int32_t> table_;  ///< index into blocks_, -1 when free; power of two, at most half full
   int size_ = 0;
   int scans_ = 0;
+  std::int64_t inserted_points_ = 0;
   bool has_slid_ = false;
   Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();
 };

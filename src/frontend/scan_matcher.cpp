@@ -17,9 +17,9 @@ constexpr double kConvergedAngle = 1e-5;     // rad
 // A normal "touches" a world axis when its component exceeds this; every unit vector touches at least one.
 constexpr double kTouch = 0.5;
 constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say little about what is observed
-// A map of so many scans adds as much to a distance as the point does. NIS of a standing L1 in its first second: 100 to
-// 200 without, 2 to 6 of 6 degrees of freedom with it.
-constexpr double kNoisyMapScans = 20.0;
+// A map of so many points, a second of L1 scans, adds as much to a distance as the point does. NIS of a standing L1 in
+// that second: 100 to 200 without this, 2 to 6 of 6 degrees of freedom with it.
+constexpr double kNoisyMapPoints = 20'000.0;
 
 Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, const Eigen::Vector3d& normal) {
   Vector6d h;
@@ -56,7 +56,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
   }
   const Assessment assessment = assess(result.filter);
   find_observed_directions(assessment, map);
-  const double noise_ratio = kNoisyMapScans / std::max(static_cast<double>(map.scans()), 1.0);
+  const double noise_ratio = kNoisyMapPoints / std::max(static_cast<double>(map.inserted_points()), 1.0);
   map_noise_ = 1.0 + noise_ratio * noise_ratio;
   result.stats.mean_innovation = assessment.mean_innovation;
   result.stats.observability = assessment.observability;
