@@ -198,7 +198,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
 
     Matrix6d to_odom = Matrix6d::Identity();
     to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
-    result.information_body = to_odom.transpose() * result.reliable.information * to_odom;
+    result.information_body = to_odom.transpose() * sum.information * to_odom;
     result.stats.used = sum.count;
     if (update.step.segment<3>(kPosition).norm() < kConvergedPosition &&
         update.step.segment<3>(kAttitude).norm() < kConvergedAngle) {
