@@ -1,7 +1,8 @@
-"""ESKF-only beside smoothed: a horizontal slice of the map, the trajectory, and the loops that were closed.
+r"""ESKF-only beside smoothed: a horizontal slice of the map, the trajectory, and the loops that were closed.
 
     ./ignis replay LOG --no-loops --config CFG --out A && ./ignis replay LOG --config CFG --out B
-    ./ignis shell env PYTHONPATH=python python3 bench/loop_pictures.py A B -o docs/images/NAME.png [--title TEXT]
+    ./ignis shell env PYTHONPATH=python python3 bench/loop_pictures.py A B --truth TRUTH.tum \\
+        -o docs/images/NAME.png [--title TEXT]
 """
 
 import argparse
@@ -65,12 +66,12 @@ def main() -> None:
     parser.add_argument("--title", default="")
     arguments = parser.parse_args()
     truth = read_tum(arguments.truth)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 6), sharex=True, sharey=True, layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 6.5), sharex=True, sharey=True, layout="constrained")
     draw(left, arguments.without, read_tum(arguments.closed / "eskf.tum"), truth, "ESKF only")
     draw(right, arguments.closed, read_tum(arguments.closed / "smoothed.tum"), truth, "smoothed")
     positions, loops = keyframes(arguments.closed)
     lines = [(positions[a][[0, 2]], positions[b][[0, 2]]) for a, b in loops]
-    right.add_collection(LineCollection(lines, colors="tab:red", linewidths=0.8))
+    right.add_collection(LineCollection(lines, colors="tab:red", linewidths=1.2))
     left.set_ylabel("z [m]")
     figure.suptitle(f"{arguments.title} ({len(loops)} loops in red)" if arguments.title else "")
     figure.savefig(arguments.output, dpi=90)

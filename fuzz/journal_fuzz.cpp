@@ -33,6 +33,10 @@ std::vector<std::byte> framed(std::span<const std::byte> input) {
 void check(std::span<const std::byte> bytes) {
   const JournalContents contents = read_journal(bytes);
   require(contents.whole_bytes <= bytes.size());
+  if (!contents.is_journal) {
+    require(contents.payloads.empty() && contents.whole_bytes == 0 && !contents.damage.empty());
+    return;
+  }
   require(contents.damage.empty() == (contents.whole_bytes == bytes.size()));
   RestoredGraph graph;
   for (const std::span<const std::byte> payload : contents.payloads) {
