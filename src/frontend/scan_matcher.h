@@ -19,9 +19,9 @@ struct MatchResult {
   FilterState filter;  ///< corrected, or the unchanged prediction when the scan was not applied
   ScanStats stats;     ///< reason and figures; stamps are the caller's
   /// What the scan alone says about the pose (sum of h h^T / r), with the weights that the
-  /// correction has used: along a blind direction more than the covariance may rely on. The graph would otherwise prefer
-  /// dead reckoning over a whole interval to what the filter made of the same samples and the weak structure. Attitude
-  /// and position both in body axes. Zero when not applied.
+  /// correction has used: along a blind direction more than the covariance may rely on. The graph would otherwise
+  /// prefer dead reckoning over a whole interval to what the filter made of the same samples and the weak structure.
+  /// Attitude and position both in body axes. Zero when not applied.
   Matrix6d information_body = Matrix6d::Zero();
   /// The same as sum over the points, order and axes of PoseInformation: what the covariance may rely on.
   PoseInformation reliable;
