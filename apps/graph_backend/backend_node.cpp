@@ -66,7 +66,7 @@ void BackendNode::on_keyframe_part(const keyframe_t& part) {
     begin_session(keyframe->session);
   }
   if (keyframe->id < graph_.smoother().expected_id()) return;  // a repeat that somebody else asked for
-  inbox_.put(std::move(*keyframe));
+  inbox_.put(std::move(*keyframe), std::chrono::steady_clock::now());
   add_waiting_keyframes();
 }
 

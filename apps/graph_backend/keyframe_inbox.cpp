@@ -12,8 +12,8 @@ constexpr int kMaxRequests = 40;
 
 }  // namespace
 
-void KeyframeInbox::put(Keyframe keyframe) {
-  last_arrival_ = std::chrono::steady_clock::now();
+void KeyframeInbox::put(Keyframe keyframe, Time now) {
+  last_arrival_ = now;
   waiting_.insert_or_assign(keyframe.id, std::move(keyframe));
 }
 

@@ -16,7 +16,7 @@ class KeyframeInbox {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  void put(Keyframe keyframe);
+  void put(Keyframe keyframe, Time now);
   void clear() { waiting_.clear(); }
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
 

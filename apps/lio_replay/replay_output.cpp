@@ -151,6 +151,25 @@ Json inventory_json(const LogInventory& inventory) {
           {"first_drop", drop_json(inventory)}};
 }
 
+/// What the graph has changed, and what may be expected of that.
+Json smoothing_json(const ReplayResult& result) {
+  double largest_m = 0.0;
+  double largest_rad = 0.0;
+  for (std::size_t i = 0; i < result.odometry.size(); ++i) {
+    const Vector6d moved = body_difference(result.odometry[i].T_world_body, result.smoothed[i].T_world_body);
+    largest_rad = std::max(largest_rad, moved.head<3>().norm());
+    largest_m = std::max(largest_m, moved.tail<3>().norm());
+  }
+  const char* expectation = result.smoother.loops_kept > 0 ? "loops tie places together"
+                            : result.smoother.keyframes < 2
+                                ? "no gain: the graph holds no motion, smoothed equals ESKF-only"
+                                : "no gain in position: without a loop the graph knows nothing that the filter did not";
+  return {{"loops", result.smoother.loops_kept},
+          {"largest_shift_m", largest_m},
+          {"largest_turn_rad", largest_rad},
+          {"expectation", expectation}};
+}
+
 Json live_json(const LiveAgreement& live, Utime first) {
   Json json = {{"recorded_scans", live.recorded},
                {"equal_scans", live.equal},
@@ -187,6 +206,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
   json["loops_accepted"] = accepted;
   json["loops_kept"] = result.smoother.loops_kept;
   json["loops_withdrawn"] = result.smoother.loops_withdrawn;
+  json["smoothing"] = smoothing_json(result);
   json["batch_optimum"] = {{"solved", result.optimum.solved},
                            {"largest_gap_m", result.optimum.largest_gap_m},
                            {"largest_gap_rad", result.optimum.largest_gap_rad},

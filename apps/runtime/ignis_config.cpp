@@ -1,9 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/ignis_config.h"
 
+#include <array>
+#include <format>
+
 #include "common/fingerprint.h"
 
 namespace ignis::runtime {
+
+void IgnisConfig::check(config::Offences& offences, const std::string& path) const {
+  struct Pair {
+    const char* graph_field;
+    double graph;
+    const char* filter_field;
+    double filter;
+  };
+  const FrontendConfig& filter = frontend.filter;
+  const ImuNoise& graph = backend.imu;
+  const std::array<Pair, 3> pairs{{{"gravity", graph.gravity, "gravity_m", filter.gravity_m},
+                                   {"gyro_noise", graph.gyro_noise, "imu_noise_gyro", filter.imu_noise_gyro},
+                                   {"accel_noise", graph.accel_noise, "imu_noise_accel", filter.imu_noise_accel}}};
+  const std::string prefix = path.empty() ? "" : path + '.';
+  for (const Pair& pair : pairs) {
+    if (pair.graph == pair.filter) continue;
+    offences.push_back({std::format("{}backend.imu.{}", prefix, pair.graph_field), std::format("{}", pair.graph),
+                        std::format("the same as {}frontend.{}, {}: they describe one inertial unit", prefix,
+                                    pair.filter_field, pair.filter)});
+  }
+}
 
 IgnisConfig load_config(const std::filesystem::path& file, const std::vector<std::string>& changes) {
   try {

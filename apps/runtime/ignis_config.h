@@ -50,6 +50,9 @@ struct IgnisConfig {
     visit.section("hmi", self.hmi, "browser view");
     visit.section("lcm", self.lcm, "message bus");
   }
+  /// Filter and graph describe one inertial unit: gravity and noise densities must agree. Bias walks may differ, since
+  /// the filter's also stands for what its linearisation leaves out.
+  void check(config::Offences& offences, const std::string& path) const;
 };
 
 /// Reads, checks and returns a configuration; throws config::ConfigError with every offence. `changes` are assignments

@@ -183,13 +183,13 @@ std::string chain_problem(const SmootherState& state, const SmootherState& news)
 
 /// Why the estimates and loops of `change` do not fit to the nodes, of which `known` are not new, or nothing.
 std::string reference_problem(const SmootherState& state, std::size_t known, const GraphChange& change) {
-  std::size_t new_estimates = 0;
+  std::vector<bool> has_estimate(state.nodes.size() - known);
   for (const LinearisationPoint& point : change.linearised) {
     const std::size_t index = index_of(state.nodes, point.id);
     if (index == state.nodes.size()) return std::format("an estimate names the unknown keyframe {}", point.id);
-    if (index >= known) ++new_estimates;
+    if (index >= known) has_estimate[index - known] = true;
   }
-  if (new_estimates != state.nodes.size() - known) return "a new keyframe has no estimate";
+  if (std::ranges::find(has_estimate, false) != has_estimate.end()) return "a new keyframe has no estimate";
   if (!change.loops) return {};
   for (const std::vector<GraphLoop>* list : {&change.loops->loops, &change.loops->waiting}) {
     for (const GraphLoop& loop : *list) {

@@ -9,8 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include "backend/plane_map.h"
-#include "backend/view_grid.h"
 #include "common/so3.h"
 
 namespace ignis {
@@ -22,17 +20,16 @@ constexpr double kConvergedRotation = 2e-4;  // [rad]
 constexpr double kKernelPerRadius = 0.2;     // width of the Cauchy kernel relative to the search radius
 constexpr double kAgreeingCosine = 0.87;     // 30 degrees between a point's own normal and the map's
 constexpr double kWallCosine = 0.5;          // a surface whose normal is at least 60 degrees from the body's up
+// An alignment is given up when, after so many iterations at the last radius, it is as far from passing as this.
+constexpr int kIterationsUntilHopeless = 4;
+constexpr double kHopelessFraction = 0.6;    // of what must be matched
+constexpr double kHopelessCorrection = 1.5;  // times the largest one allowed
 
-/// A point and the direction of the surface it lies on, where that is known.
-struct SurfacePoint {
-  Eigen::Vector3d position;
-  std::optional<Eigen::Vector3d> normal;
+bool on_wall(const SurfacePoint& point) { return point.normal && std::abs(point.normal->y()) < kWallCosine; }
 
-  [[nodiscard]] bool on_wall() const { return normal && std::abs(normal->y()) < kWallCosine; }
-  [[nodiscard]] bool agrees_with(const Eigen::Vector3d& other) const {
-    return !normal || std::abs(normal->dot(other)) > kAgreeingCosine;
-  }
-};
+bool agree(const SurfacePoint& point, const Eigen::Vector3d& normal) {
+  return !point.normal || std::abs(point.normal->dot(normal)) > kAgreeingCosine;
+}
 
 /// Normal equations of the point-to-plane distances, perturbing the source pose in its body axes.
 struct NormalEquations {
@@ -57,7 +54,7 @@ NormalEquations accumulate(std::span<const SurfacePoint> source, PlaneMap& map, 
     if (!plane) continue;
     const double residual = plane->normal.dot(p_map - plane->centre);
     const Eigen::Vector3d n_source = R_source_map * plane->normal;
-    if (!point.agrees_with(n_source)) continue;
+    if (!agree(point, n_source)) continue;
     Vector6d J;
     J << p_source.cross(n_source), n_source;
     const double weight = 1.0 / (1.0 + residual * residual / (kernel * kernel));
@@ -67,7 +64,7 @@ NormalEquations accumulate(std::span<const SurfacePoint> source, PlaneMap& map, 
     sum.weight += weight;
     sum.absolute += std::abs(residual);
     ++sum.matched;
-    if (point.on_wall()) ++sum.walls_matched;
+    if (on_wall(point)) ++sum.walls_matched;
   }
   return sum;
 }
@@ -114,6 +111,10 @@ std::vector<Eigen::Vector3d> finite_points(std::span<const CloudPoint> cloud) {
   return points;
 }
 
+PlaneGates gates_of(const LoopMatcherConfig& config) {
+  return {config.plane_radius_m, config.plane_thickness_m, config.plane_min_points};
+}
+
 /// One point per source voxel of `points`, with the direction of its surface in `surfaces`.
 std::vector<SurfacePoint> surface_points(std::span<const Eigen::Vector3d> points, PlaneMap& surfaces,
                                          const LoopMatcherConfig& config) {
@@ -127,8 +128,7 @@ std::vector<SurfacePoint> surface_points(std::span<const Eigen::Vector3d> points
 
 /// Of the map's upright surfaces that the source would show, the fraction that it shows; of all surfaces where none is
 /// upright, for a floor lies under any place. Nothing to show counts as nothing shown.
-double overlap(std::span<const Eigen::Vector3d> source, PlaneMap& source_surfaces,
-               std::span<const Eigen::Vector3d> map_points, PlaneMap& map, const Pose& T_map_source,
+double overlap(LoopSource& source, std::span<const Eigen::Vector3d> map_points, PlaneMap& map, const Pose& T_map_source,
                const LoopMatcherConfig& config) {
   struct Count {
     int would_show = 0;
@@ -136,26 +136,43 @@ double overlap(std::span<const Eigen::Vector3d> source, PlaneMap& source_surface
   };
   Count all;
   Count upright;
-  const ViewGrid view(source, config.view_cell_deg * std::numbers::pi / 180.0);
   const Pose T_source_map = T_map_source.inverse();
   for (const Eigen::Vector3d& p_map : one_per_voxel(map_points, config.source_voxel_m)) {
     const Eigen::Vector3d p_source = T_source_map * p_map;
-    if (!view.would_show(p_source, config.last_radius_m)) continue;
+    if (!source.view.would_show(p_source, config.last_radius_m)) continue;
     const auto map_plane = map.nearest_plane(p_map, config.plane_radius_m);
     if (!map_plane) continue;
     const SurfacePoint surface{p_source, T_source_map.rotation * map_plane->normal};
-    const auto plane = source_surfaces.nearest_plane(p_source, config.last_radius_m);
+    const auto plane = source.surfaces.nearest_plane(p_source, config.last_radius_m);
     // Too few points for a plane say neither yes nor no.
-    if (!plane && source_surfaces.has_point_near(p_source, config.last_radius_m)) continue;
-    const bool shown = plane && surface.agrees_with(plane->normal);
+    if (!plane && source.surfaces.has_point_near(p_source, config.last_radius_m)) continue;
+    const bool shown = plane && agree(surface, plane->normal);
     for (Count* count : {&all, &upright}) {
-      if (count == &upright && !surface.on_wall()) continue;
+      if (count == &upright && !on_wall(surface)) continue;
       ++count->would_show;
       if (shown) ++count->shown;
     }
   }
   const Count& counted = upright.would_show > 0 ? upright : all;
   return counted.would_show > 0 ? static_cast<double>(counted.shown) / counted.would_show : 0.0;
+}
+
+/// How much of the source has found its like, and how far the alignment has moved it.
+void note_agreement(LoopMatch& match, const NormalEquations& sum, const LoopSource& source, const Pose& T_predicted) {
+  match.matched_fraction = static_cast<double>(sum.matched) / static_cast<double>(source.points.size());
+  // Without upright surfaces nothing was asked of them; the count of directions then decides.
+  match.wall_fraction = source.walls > 0 ? static_cast<double>(sum.walls_matched) / source.walls : 1.0;
+  match.mean_residual = sum.matched > 0 ? sum.absolute / sum.matched : 0.0;
+  const Vector6d correction = body_difference(T_predicted, match.T_map_source);
+  match.correction_rad = correction.head<3>().norm();
+  match.correction_m = correction.tail<3>().norm();
+}
+
+/// More iterations will not make a loop of this: far too little matches, or it has run away.
+bool hopeless(const LoopMatch& match, const LoopMatcherConfig& config, const LoopGates& gates) {
+  return match.matched_fraction < kHopelessFraction * gates.loop_match_min_frac ||
+         match.wall_fraction < kHopelessFraction * config.min_wall_fraction ||
+         match.correction_m > kHopelessCorrection * gates.loop_max_correction_m;
 }
 
 void judge(LoopMatch& match, bool converged, const LoopMatcherConfig& config, const LoopGates& gates) {
@@ -204,55 +221,55 @@ void LoopMatcherConfig::check(config::Offences& offences, const std::string& pat
   }
 }
 
-LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::Vector3d> map_points,
+LoopSource::LoopSource(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config)
+    : LoopSource(finite_points(cloud), config) {}
+
+LoopSource::LoopSource(const std::vector<Eigen::Vector3d>& cloud, const LoopMatcherConfig& config)
+    : surfaces(cloud, config.map_voxel_m, gates_of(config)),
+      points(surface_points(cloud, surfaces, config)),
+      walls(static_cast<int>(std::ranges::count_if(points, on_wall))),
+      view(cloud, config.view_cell_deg * std::numbers::pi / 180.0) {}
+
+LoopMatch match_loop(LoopSource& source, std::span<const Eigen::Vector3d> map_points,
                      const Pose& T_map_source_predicted, const LoopMatcherConfig& config, const LoopGates& gates) {
   LoopMatch match;
   match.T_map_source = T_map_source_predicted;
-  const PlaneGates plane_gates{config.plane_radius_m, config.plane_thickness_m, config.plane_min_points};
-  const std::vector<Eigen::Vector3d> source_cloud = finite_points(source);
-  PlaneMap source_surfaces(source_cloud, config.map_voxel_m, plane_gates);
-  const std::vector<SurfacePoint> points = surface_points(source_cloud, source_surfaces, config);
-  if (points.empty() || map_points.empty()) {
-    match.reason_text = points.empty() ? "the keyframe has no points" : "the candidate has no points";
+  if (source.points.empty() || map_points.empty()) {
+    match.reason_text = source.points.empty() ? "the keyframe has no points" : "the candidate has no points";
     return match;
   }
-  PlaneMap map(map_points, config.map_voxel_m, plane_gates);
-  const double length = rms_range(points);
+  PlaneMap map(map_points, config.map_voxel_m, gates_of(config));
+  const double length = rms_range(source.points);
 
   bool converged = false;
   double radius = config.first_radius_m;
+  int at_last_radius = 0;
   while (!converged && match.iterations < config.max_iterations) {
-    const NormalEquations equations = accumulate(points, map, match.T_map_source, radius);
+    const NormalEquations equations = accumulate(source.points, map, match.T_map_source, radius);
     const ObservedPart part = observed_part(equations, length, config.degenerate_ratio);
     ++match.iterations;
     if (part.directions == 0) break;
     match.T_map_source = perturbed_in_body(match.T_map_source, part.step);
-    converged = radius <= config.last_radius_m && part.step.head<3>().norm() < kConvergedRotation &&
+    note_agreement(match, equations, source, T_map_source_predicted);
+    if (radius <= config.last_radius_m) ++at_last_radius;
+    converged = at_last_radius > 0 && part.step.head<3>().norm() < kConvergedRotation &&
                 part.step.tail<3>().norm() < kConvergedPosition;
+    if (at_last_radius >= kIterationsUntilHopeless && hopeless(match, config, gates)) break;
     radius = std::max(config.last_radius_m, kRadiusShrink * radius);
   }
 
-  const NormalEquations final_sum = accumulate(points, map, match.T_map_source, config.last_radius_m);
+  const NormalEquations final_sum = accumulate(source.points, map, match.T_map_source, config.last_radius_m);
   const ObservedPart part = observed_part(final_sum, length, config.degenerate_ratio);
   match.directions = part.directions;
-  match.matched_fraction = static_cast<double>(final_sum.matched) / static_cast<double>(points.size());
-  const auto walls = std::ranges::count_if(points, &SurfacePoint::on_wall);
-  // Without upright surfaces nothing was asked of them; the count of directions then decides.
-  match.wall_fraction = walls > 0 ? static_cast<double>(final_sum.walls_matched) / static_cast<double>(walls) : 1.0;
+  note_agreement(match, final_sum, source, T_map_source_predicted);
   const bool enough_matched =
       match.matched_fraction >= gates.loop_match_min_frac && match.wall_fraction >= config.min_wall_fraction;
   // The other way round costs as much again; most candidates have failed by now.
-  if (enough_matched) {
-    match.overlap = overlap(source_cloud, source_surfaces, map_points, map, match.T_map_source, config);
-  }
-  if (final_sum.matched > 0) match.mean_residual = final_sum.absolute / final_sum.matched;
+  if (enough_matched) match.overlap = overlap(source, map_points, map, match.T_map_source, config);
   const double floor = config.noise_floor_m * config.noise_floor_m;
   const double variance =
       final_sum.weight > 0.0 ? std::max(floor, final_sum.weighted_square / final_sum.weight) : floor;
   match.information = part.H / variance;
-  const Vector6d correction = body_difference(T_map_source_predicted, match.T_map_source);
-  match.correction_rad = correction.head<3>().norm();
-  match.correction_m = correction.tail<3>().norm();
   judge(match, converged, config, gates);
   return match;
 }

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "backend/loop_result.h"
+#include "backend/plane_map.h"
+#include "backend/view_grid.h"
 #include "common/config_fields.h"
 #include "common/loop_gates.h"
 #include "common/measurements.h"
@@ -56,6 +60,25 @@ struct LoopMatcherConfig {
   void check(config::Offences& offences, const std::string& path) const;
 };
 
+/// A point and the direction of the surface it lies on, where that is known. Body axes.
+struct SurfacePoint {
+  Eigen::Vector3d position;
+  std::optional<Eigen::Vector3d> normal;
+};
+
+/// The keyframe that looks, prepared once for all candidates.
+struct LoopSource {
+  LoopSource(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config);
+
+  PlaneMap surfaces;                 ///< of the whole cloud
+  std::vector<SurfacePoint> points;  ///< one per voxel of it, to be aligned
+  int walls;                         ///< of the points, those on upright surfaces
+  ViewGrid view;
+
+ private:
+  LoopSource(const std::vector<Eigen::Vector3d>& cloud, const LoopMatcherConfig& config);
+};
+
 /// What the match found. The pose and the figures are filled for a refused match too.
 struct LoopMatch {
   LoopReason reason = LoopReason::kTooFewMatched;
@@ -75,7 +98,7 @@ struct LoopMatch {
   [[nodiscard]] bool verified() const { return reason == LoopReason::kAccepted; }
 };
 
-/// Aligns `source` (body frame of the current keyframe) with the local map `map_points` (any frame) by point-to-plane
+/// Aligns `source` with the local map `map_points` (any frame) by point-to-plane
 /// Gauss-Newton with a search radius that narrows and Cauchy weights, beginning at `T_map_source` predicted; then
 /// applies the gates. Directions in which the geometry says nothing keep the prediction and get no information (J.
 /// Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state estimation problems", ICRA 2016).
@@ -84,7 +107,7 @@ struct LoopMatch {
 /// with that of the point's own surroundings, where those are planar. The overlap asks the other way round, so that a
 /// bare corner that fits into any room is not enough: of the map's surfaces that lie in the view of the source and are
 /// not hidden from it, how many lie on planes of the source?
-[[nodiscard]] LoopMatch match_loop(std::span<const CloudPoint> source, std::span<const Eigen::Vector3d> map_points,
+[[nodiscard]] LoopMatch match_loop(LoopSource& source, std::span<const Eigen::Vector3d> map_points,
                                    const Pose& T_map_source_predicted, const LoopMatcherConfig& config,
                                    const LoopGates& gates);
 

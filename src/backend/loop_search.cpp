@@ -83,11 +83,12 @@ LoopProposal best_match(const std::vector<std::size_t>& chosen, const SmootherSt
   LoopProposal proposal;
   const KeyframePose& current = state.poses.back();
   const auto neighbours = static_cast<std::size_t>(config.matcher.neighbours);
+  LoopSource source(state.clouds.back(), config.matcher);
   LoopMatch best;
   for (const std::size_t i : chosen) {
     const Pose T_candidate_current = state.poses[i].T_map_body.inverse() * current.T_map_body;
-    const LoopMatch match = match_loop(state.clouds.back(), local_map(i, neighbours, state.poses, state.clouds),
-                                       T_candidate_current, config.matcher, gates);
+    const LoopMatch match = match_loop(source, local_map(i, neighbours, state.poses, state.clouds), T_candidate_current,
+                                       config.matcher, gates);
     if (match.verified()) ++proposal.result.passed;
     if (i != chosen.front() && !is_better(match, best)) continue;
     best = match;

@@ -3,8 +3,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <boost/unordered/unordered_flat_set.hpp>
 #include <cmath>
-#include <unordered_set>
+#include <numeric>
 
 #include "common/grid.h"
 
@@ -23,10 +24,24 @@ std::uint64_t key_of(const Eigen::Vector3i& cell) {
   return (part(cell.x()) << 42U) | (part(cell.y()) << 21U) | part(cell.z());
 }
 
+/// Squared distance of a coordinate from the slab of a cell [m^2].
+double slab_distance2(double coordinate, int cell) {
+  const double low = cell * kCellSize;
+  const double d = std::max({low - coordinate, coordinate - (low + kCellSize), 0.0});
+  return d * d;
+}
+
+/// From a point to the nearest face of its own cell [m].
+double distance_to_faces(const Eigen::Vector3d& point, const Eigen::Vector3i& home) {
+  const Eigen::Vector3d inside = point - kCellSize * home.cast<double>();
+  return std::max(0.0, std::min(inside.minCoeff(), kCellSize - inside.maxCoeff()));
+}
+
 }  // namespace
 
 std::vector<Eigen::Vector3d> one_per_voxel(std::span<const Eigen::Vector3d> points, double voxel_m) {
-  std::unordered_set<std::uint64_t> taken;
+  boost::unordered_flat_set<std::uint64_t> taken;
+  taken.reserve(points.size());
   std::vector<Eigen::Vector3d> kept;
   for (const Eigen::Vector3d& point : points) {
     if (taken.insert(key_of(cell_at(point, voxel_m))).second) kept.push_back(point);
@@ -34,38 +49,54 @@ std::vector<Eigen::Vector3d> one_per_voxel(std::span<const Eigen::Vector3d> poin
   return kept;
 }
 
-PlaneMap::PlaneMap(std::span<const Eigen::Vector3d> points, double voxel_m, const PlaneGates& gates)
-    : gates_(gates), points_(one_per_voxel(points, voxel_m)), entries_(points_.size()) {
-  for (std::size_t i = 0; i < points_.size(); ++i) cells_[key_of(cell_at(points_[i], kCellSize))].push_back(i);
+PlaneMap::PlaneMap(std::span<const Eigen::Vector3d> points, double voxel_m, const PlaneGates& gates) : gates_(gates) {
+  sort_into_cells(one_per_voxel(points, voxel_m));
+  entries_.resize(points_.size());
 }
 
-template <class Visit>
-void PlaneMap::visit_cell(const Eigen::Vector3i& cell, Visit visit) const {
+void PlaneMap::sort_into_cells(std::span<const Eigen::Vector3d> points) {
+  std::vector<std::uint64_t> keys(points.size());
+  std::ranges::transform(points, keys.begin(), [](const auto& point) { return key_of(cell_at(point, kCellSize)); });
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return keys[i]; });
+  points_.reserve(points.size());
+  for (const std::size_t i : order) {
+    Range& range = cells_.try_emplace(keys[i], Range{points_.size(), points_.size()}).first->second;
+    points_.push_back(points[i]);
+    range.end = points_.size();
+  }
+}
+
+PlaneMap::Range PlaneMap::points_of(const Eigen::Vector3i& cell) const {
   const auto found = cells_.find(key_of(cell));
-  if (found == cells_.end()) return;
-  for (const std::size_t i : found->second) visit(i);
+  return found == cells_.end() ? Range{} : found->second;
 }
 
 std::optional<std::size_t> PlaneMap::nearest_point(const Eigen::Vector3d& point, double radius_m) const {
   const Eigen::Vector3i home = cell_at(point, kCellSize);
-  const int reach = static_cast<int>(std::ceil(radius_m / kCellSize));
+  const double to_faces = distance_to_faces(point, home);
   double best = radius_m * radius_m;
   std::optional<std::size_t> nearest;
-  for (int shell = 0; shell <= reach; ++shell) {
-    // Everything in this shell is at least (shell - 1) whole cells away.
-    const double closest = std::max(0, shell - 1) * kCellSize;
-    if (nearest && closest * closest > best) break;
+  for (int shell = 0;; ++shell) {
+    const double closest = shell == 0 ? 0.0 : (shell - 1) * kCellSize + to_faces;
+    if (closest * closest >= best) break;
     for (int x = -shell; x <= shell; ++x) {
+      const double in_x = slab_distance2(point.x(), home.x() + x);
+      if (in_x >= best) continue;
       for (int y = -shell; y <= shell; ++y) {
+        const double in_xy = in_x + slab_distance2(point.y(), home.y() + y);
+        if (in_xy >= best) continue;
         const bool on_face = std::abs(x) == shell || std::abs(y) == shell;
         for (int z = -shell; z <= shell; z += (on_face || shell == 0) ? 1 : 2 * shell) {
-          visit_cell(home + Eigen::Vector3i(x, y, z), [&](std::size_t i) {
+          if (in_xy + slab_distance2(point.z(), home.z() + z) >= best) continue;
+          const Range range = points_of(home + Eigen::Vector3i(x, y, z));
+          for (std::size_t i = range.begin; i < range.end; ++i) {
             const double distance = (points_[i] - point).squaredNorm();
-            if (distance < best) {
-              best = distance;
-              nearest = i;
-            }
-          });
+            if (distance >= best) continue;
+            best = distance;
+            nearest = i;
+          }
         }
       }
     }
@@ -82,13 +113,14 @@ PlaneMap::Entry PlaneMap::fit_plane(const Eigen::Vector3d& at) const {
   for (int x = low.x(); x <= high.x(); ++x) {
     for (int y = low.y(); y <= high.y(); ++y) {
       for (int z = low.z(); z <= high.z(); ++z) {
-        visit_cell({x, y, z}, [&](std::size_t i) {
+        const Range range = points_of({x, y, z});
+        for (std::size_t i = range.begin; i < range.end; ++i) {
           const Eigen::Vector3d d = points_[i] - at;  // centred on the query: no cancellation far from the origin
-          if (d.squaredNorm() > gates_.radius_m * gates_.radius_m) return;
+          if (d.squaredNorm() > gates_.radius_m * gates_.radius_m) continue;
           ++count;
           sum += d;
           squares += d * d.transpose();
-        });
+        }
       }
     }
   }

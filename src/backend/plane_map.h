@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include <Eigen/Core>
+#include <boost/unordered/unordered_flat_map.hpp>
 
 namespace ignis {
 
@@ -48,15 +48,21 @@ class PlaneMap {
     SurfacePlane plane;
   };
 
+  /// Places in points_ of the points of one cell.
+  struct Range {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+
+  void sort_into_cells(std::span<const Eigen::Vector3d> points);
   [[nodiscard]] std::optional<std::size_t> nearest_point(const Eigen::Vector3d& point, double radius_m) const;
   [[nodiscard]] Entry fit_plane(const Eigen::Vector3d& at) const;
-  template <class Visit>
-  void visit_cell(const Eigen::Vector3i& cell, Visit visit) const;
+  [[nodiscard]] Range points_of(const Eigen::Vector3i& cell) const;
 
   PlaneGates gates_;
-  std::vector<Eigen::Vector3d> points_;
+  std::vector<Eigen::Vector3d> points_;  ///< cell by cell
   std::vector<Entry> entries_;
-  std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
+  boost::unordered_flat_map<std::uint64_t, Range> cells_;
 };
 
 /// One point (the first) per cubic voxel, in the order of the input.

@@ -200,9 +200,7 @@ class GraphReader {
 
 }  // namespace
 
-void write_pose_graph(const std::filesystem::path& file, const PoseGraph& graph) {
-  FileOutput output(file);
-  std::ostream& out = output.stream();
+void write_pose_graph(std::ostream& out, const PoseGraph& graph) {
   for (const KeyframePose& vertex : graph.vertices) {
     out << std::format("{} {}", graph.planar ? kPlanarVertex : kVertex, vertex.id);
     graph.planar ? write_planar_pose(out, vertex.T_map_body) : write_pose(out, vertex.T_map_body);
@@ -210,16 +208,25 @@ void write_pose_graph(const std::filesystem::path& file, const PoseGraph& graph)
   }
   if (!graph.vertices.empty()) out << std::format("FIX {}\n", graph.vertices.front().id);
   for (const PoseGraphEdge& edge : graph.edges) write_edge(out, edge, graph.planar);
+}
+
+void write_pose_graph(const std::filesystem::path& file, const PoseGraph& graph) {
+  FileOutput output(file);
+  write_pose_graph(output.stream(), graph);
   output.commit();
+}
+
+PoseGraph read_pose_graph(std::istream& in, const std::string& name) {
+  GraphReader reader(name);
+  std::string line;
+  while (std::getline(in, line)) reader.read(line);
+  return reader.finish();
 }
 
 PoseGraph read_pose_graph(const std::filesystem::path& file) {
   std::ifstream in(file);
   if (!in) throw std::runtime_error(std::format("{}: cannot be opened for reading", file.string()));
-  GraphReader reader(file.string());
-  std::string line;
-  while (std::getline(in, line)) reader.read(line);
-  return reader.finish();
+  return read_pose_graph(in, file.string());
 }
 
 }  // namespace ignis

@@ -23,12 +23,15 @@ double heading_change(const NavState& from, const NavState& to) {
 
 }  // namespace
 
-Keyframer::Keyframer(const FrontendConfig& config, std::int32_t session) : config_(config), session_(session) {
+Keyframer::Keyframer(const FrontendConfig& config, std::int32_t session)
+    : config_(config), session_(session), information_(config) {
   config::require_valid(config, "frontend");
 }
 
 void Keyframer::add_imu(const ImuSample& sample) {
-  if (next_id_ > 0) imu_.push_back(sample);
+  if (next_id_ == 0) return;
+  imu_.push_back(sample);
+  information_.add_imu(sample);
 }
 
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
@@ -38,7 +41,7 @@ std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Mat
   const Utime oldest = state.utime - to_micros(config_.keyframe_cloud_seconds);
   while (recent_.front().utime <= oldest) recent_.pop_front();
 
-  information_sum_ += information_body;
+  if (next_id_ > 0) information_.add_scan(state, information_body);
   ++scans_;
   note_motion(state);
   if (!due(state)) return std::nullopt;
@@ -94,7 +97,7 @@ Keyframe Keyframer::make(const FilterState& filter) {
   keyframe.cloud = merged_cloud(state.T_odom_body);
   keyframe.previous_utime = next_id_ == 0 ? state.utime : last_.utime;
   if (next_id_ > 0) {
-    keyframe.scan_information = information_sum_ / scans_;
+    keyframe.scan_information = information_.information();
     keyframe.stationary = stood_still(state);
     keyframe.imu_complete = imu_complete_;
   }
@@ -102,8 +105,8 @@ Keyframe Keyframer::make(const FilterState& filter) {
 
   ++next_id_;
   last_ = state;
+  information_.begin(filter);
   imu_complete_ = true;
-  information_sum_.setZero();
   scans_ = 0;
   speed2_sum_ = 0.0;
   max_displacement_ = 0.0;

@@ -8,6 +8,7 @@
 #include "common/keyframe.h"
 #include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
+#include "frontend/interval_information.h"
 
 namespace ignis {
 
@@ -48,7 +49,7 @@ class Keyframer {
   std::deque<RegisteredScan> recent_;
   std::vector<ImuSample> imu_;
   bool imu_complete_ = true;
-  Matrix6d information_sum_ = Matrix6d::Zero();
+  IntervalInformation information_;
   int scans_ = 0;                  ///< in the interval
   double speed2_sum_ = 0.0;        ///< [m^2/s^2] over the scans of the interval
   double max_displacement_ = 0.0;  ///< [m] from the last keyframe

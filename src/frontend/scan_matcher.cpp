@@ -207,16 +207,21 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
     iterate.covariance = update.covariance;
     gate_covariance = update.covariance;
 
-    Matrix6d to_odom = Matrix6d::Identity();
-    to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
-    result.information_body = to_odom.transpose() * result.reliable.information * to_odom;
     result.stats.used = all.count;
     if (update.step.segment<3>(kPosition).norm() < kConvergedPosition &&
         update.step.segment<3>(kAttitude).norm() < kConvergedAngle) {
       break;
     }
   }
-  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0 && !use_doubtful(iterate)) return false;
+  Matrix6d used = result.reliable.information;
+  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0) {
+    const std::optional<PoseInformation> doubtful = use_doubtful(iterate);
+    if (!doubtful) return false;
+    used += doubtful->information;
+  }
+  Matrix6d to_odom = Matrix6d::Identity();
+  to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
+  result.information_body = to_odom.transpose() * used * to_odom;
   const Vector15d total = difference(predicted.nominal, iterate.nominal);
   result.stats.correction_m = total.segment<3>(kPosition).norm();
   result.stats.correction_rad = total.segment<3>(kAttitude).norm();
@@ -227,14 +232,14 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
 
 /// The two steps are kept apart, since a direction that is off by a degree mixes them: what is off across a corridor by
 /// millimetres would be made up for by decimetres along it.
-bool ScanMatcher::use_doubtful(FilterState& iterate) const {
+std::optional<PoseInformation> ScanMatcher::use_doubtful(FilterState& iterate) const {
   const PoseInformation doubtful =
       accumulate(iterate.nominal.T_odom_body, iterate.covariance.topLeftCorner<6, 6>()).projected(degeneracy_.doubtful);
   const UpdateStep update = information_update(iterate.covariance, Vector15d::Zero(), doubtful);
-  if (!update.ok) return false;
+  if (!update.ok) return std::nullopt;
   iterate.nominal = perturbed(iterate.nominal, update.step);
   iterate.covariance = update.covariance;
-  return true;
+  return doubtful;
 }
 
 double ScanMatcher::mean_residual(const Pose& pose) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,8 +19,10 @@ namespace ignis {
 struct MatchResult {
   FilterState filter;  ///< corrected, or the unchanged prediction when the scan was not applied
   ScanStats stats;     ///< reason and figures; stamps are the caller's
-  /// What the scan alone says about the pose (sum of h h^T / r, observed directions only); attitude and position both
-  /// in body axes. Zero when not applied.
+  /// What the scan alone says about the pose (sum of h h^T / r) as far as it has corrected the state: along a blind
+  /// direction more than the covariance may rely on. The graph would otherwise prefer dead reckoning over a whole
+  /// interval to what the filter made of the same samples and the weak structure. Attitude and position both in body
+  /// axes. Zero when not applied.
   Matrix6d information_body = Matrix6d::Zero();
   /// The same as sum over the points, order and axes of PoseInformation: what the covariance may rely on.
   PoseInformation reliable;
@@ -68,7 +71,8 @@ class ScanMatcher {
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;
   [[nodiscard]] Matrix15d considered() const;
-  [[nodiscard]] bool use_doubtful(FilterState& iterate) const;
+  /// What the doubtful part has said, after it has corrected the iterate; nothing on numerical failure.
+  [[nodiscard]] std::optional<PoseInformation> use_doubtful(FilterState& iterate) const;
   [[nodiscard]] bool iterate(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
                              const LocalMap& map, MatchResult& result);
   [[nodiscard]] ScanReason judge(const FilterState& predicted, const Assessment& assessment,

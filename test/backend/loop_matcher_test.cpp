@@ -12,6 +12,12 @@
 namespace ignis {
 namespace {
 
+LoopMatch match_cloud(const std::vector<CloudPoint>& cloud, const std::vector<Eigen::Vector3d>& map, const Pose& guess,
+                      const LoopMatcherConfig& config, const LoopGates& gates) {
+  LoopSource source(cloud, config);
+  return match_loop(source, map, guess, config, gates);
+}
+
 using testing::hall_cloud;
 
 std::vector<Eigen::Vector3d> positions(const std::vector<CloudPoint>& cloud) {
@@ -40,7 +46,7 @@ TEST(LoopMatcher, FindsThePoseFromAnOffsetCandidate) {
   for (const Vector6d& delta :
        {offset(0.0, 0.0, 0.0, 0.0), offset(0.12, 0.6, 0.1, -0.5), offset(-0.1, -0.7, -0.1, 0.6)}) {
     const LoopMatch match =
-        match_loop(views.source, views.map, perturbed_in_body(views.T_a_b, delta), LoopMatcherConfig(), LoopGates());
+        match_cloud(views.source, views.map, perturbed_in_body(views.T_a_b, delta), LoopMatcherConfig(), LoopGates());
     ASSERT_TRUE(match.verified()) << match.reason_text;
     const Vector6d error = body_difference(views.T_a_b, match.T_map_source);
     EXPECT_LT(error.head<3>().norm(), 0.002);
@@ -60,7 +66,7 @@ TEST(LoopMatcher, ClaimsAnInformationThatItsErrorsBear) {
     TwoViews views;
     views.map = positions(hall_cloud(views.T_world_a, 8000, 100 + run));
     views.source = hall_cloud(views.T_world_b, 4000, 200 + run);
-    const LoopMatch match = match_loop(views.source, views.map, views.T_a_b, LoopMatcherConfig(), LoopGates());
+    const LoopMatch match = match_cloud(views.source, views.map, views.T_a_b, LoopMatcherConfig(), LoopGates());
     ASSERT_TRUE(match.verified()) << match.reason_text;
     const Vector6d error = body_difference(match.T_map_source, views.T_a_b);
     sum += error.dot(match.information * error) / 5.0;
@@ -81,7 +87,7 @@ TEST(LoopMatcher, RefusesWrongPlaces) {
       if (away.head<3>().norm() < 0.8 && away.tail<3>().norm() < 3.0) continue;
       ++places;
       const std::vector<CloudPoint> elsewhere = hall_cloud(T_world_elsewhere, 4000, 3);
-      if (match_loop(elsewhere, views.map, views.T_a_b, LoopMatcherConfig(), LoopGates()).verified()) ++verified;
+      if (match_cloud(elsewhere, views.map, views.T_a_b, LoopMatcherConfig(), LoopGates()).verified()) ++verified;
     }
   }
   EXPECT_GE(places, 28);
@@ -92,7 +98,7 @@ TEST(LoopMatcher, AppliesEachGate) {
   const TwoViews views;
   const Pose guess = perturbed_in_body(views.T_a_b, offset(0.0, 0.5, 0.0, 0.0));
   const auto reason_with = [&](const LoopMatcherConfig& config, const LoopGates& gates) {
-    return match_loop(views.source, views.map, guess, config, gates).reason;
+    return match_cloud(views.source, views.map, guess, config, gates).reason;
   };
   LoopGates gates;
   gates.loop_match_min_frac = 0.999;
@@ -154,17 +160,17 @@ std::vector<CloudPoint> cloud_of(const std::vector<Eigen::Vector3d>& points) {
 TEST(LoopMatcher, SeesThatTheCandidateHasWallsWhichAreNotHere) {
   // An empty room fits wholly into a room of the same size with partitions; only the other way round they differ.
   const std::vector<CloudPoint> empty = cloud_of(room(false));
-  const LoopMatch same = match_loop(empty, room(false), Pose(), LoopMatcherConfig(), LoopGates());
+  const LoopMatch same = match_cloud(empty, room(false), Pose(), LoopMatcherConfig(), LoopGates());
   EXPECT_TRUE(same.verified()) << same.reason_text;
   EXPECT_GT(same.overlap, 0.95);
-  const LoopMatch other = match_loop(empty, room(true), Pose(), LoopMatcherConfig(), LoopGates());
+  const LoopMatch other = match_cloud(empty, room(true), Pose(), LoopMatcherConfig(), LoopGates());
   EXPECT_GT(other.matched_fraction, 0.7);
   EXPECT_GT(other.wall_fraction, 0.7);
   EXPECT_LT(other.overlap, 0.8);
   LoopMatcherConfig strict;
   strict.min_overlap = 0.85;
-  EXPECT_EQ(match_loop(empty, room(true), Pose(), strict, LoopGates()).reason, LoopReason::kTooLittleOverlap);
-  EXPECT_TRUE(match_loop(empty, room(false), Pose(), strict, LoopGates()).verified());
+  EXPECT_EQ(match_cloud(empty, room(true), Pose(), strict, LoopGates()).reason, LoopReason::kTooLittleOverlap);
+  EXPECT_TRUE(match_cloud(empty, room(false), Pose(), strict, LoopGates()).verified());
 }
 
 TEST(LoopMatcher, DoesNotAskForWhatIsHidden) {
@@ -174,7 +180,7 @@ TEST(LoopMatcher, DoesNotAskForWhatIsHidden) {
   for (const Eigen::Vector3d& p : all) {
     if (std::abs(p.x()) < 4.1 && std::abs(p.z()) < 2.6) inside.push_back(p);
   }
-  EXPECT_GT(match_loop(cloud_of(inside), all, Pose(), LoopMatcherConfig(), LoopGates()).overlap, 0.9);
+  EXPECT_GT(match_cloud(cloud_of(inside), all, Pose(), LoopMatcherConfig(), LoopGates()).overlap, 0.9);
 }
 
 TEST(LoopMatcher, LeavesTheDirectionOfACorridorFree) {
@@ -195,7 +201,7 @@ TEST(LoopMatcher, LeavesTheDirectionOfACorridorFree) {
   }
   Pose guess;
   guess.translation = {0.3, 0.1, 0.7};
-  const LoopMatch match = match_loop(source, map, guess, LoopMatcherConfig(), LoopGates());
+  const LoopMatch match = match_cloud(source, map, guess, LoopMatcherConfig(), LoopGates());
   ASSERT_TRUE(match.verified()) << match.reason_text;
   EXPECT_EQ(match.directions, 5);
   EXPECT_NEAR(match.T_map_source.translation.x(), 0.0, 0.02);
@@ -211,7 +217,7 @@ TEST(LoopMatcher, SaysDegenerateWhenThereIsNothingButFloor) {
       floor.push_back({{0.2F * static_cast<float>(x), -0.5F, 0.2F * static_cast<float>(z)}, 0.0F});
     }
   }
-  EXPECT_EQ(match_loop(floor, positions(floor), Pose(), LoopMatcherConfig(), LoopGates()).reason,
+  EXPECT_EQ(match_cloud(floor, positions(floor), Pose(), LoopMatcherConfig(), LoopGates()).reason,
             LoopReason::kDegenerate);
 }
 
@@ -219,9 +225,9 @@ TEST(LoopMatcher, RefusesEmptyAndNonFiniteClouds) {
   const TwoViews views;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<CloudPoint> broken(10, CloudPoint{{nan, 0.0F, 0.0F}, 0.0F});
-  EXPECT_EQ(match_loop({}, views.map, Pose(), {}, {}).reason, LoopReason::kTooFewMatched);
-  EXPECT_EQ(match_loop(broken, views.map, Pose(), {}, {}).reason, LoopReason::kTooFewMatched);
-  EXPECT_EQ(match_loop(views.source, {}, Pose(), {}, {}).reason, LoopReason::kTooFewMatched);
+  EXPECT_EQ(match_cloud({}, views.map, Pose(), {}, {}).reason, LoopReason::kTooFewMatched);
+  EXPECT_EQ(match_cloud(broken, views.map, Pose(), {}, {}).reason, LoopReason::kTooFewMatched);
+  EXPECT_EQ(match_cloud(views.source, {}, Pose(), {}, {}).reason, LoopReason::kTooFewMatched);
 }
 
 }  // namespace

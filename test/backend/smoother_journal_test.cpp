@@ -195,5 +195,20 @@ TEST(SmootherJournalRecords, SixHundredKeyframesAreBackWithinTwoSeconds) {
   expect_same(smoother, restoration.smoother);
 }
 
+TEST(GraphChange, IsRefusedWhenANewKeyframeHasNoEstimateButAnotherHasTwo) {
+  BackendConfig config;
+  config.use_loop_closing = false;
+  Smoother smoother(config, LoopGates());
+  for (const Keyframe& keyframe : testing::make_drive({.seed = 1, .keyframes = 2}).keyframes) {
+    ASSERT_TRUE(smoother.add_keyframe(keyframe).accepted());
+  }
+  std::optional<GraphChange> change = decode_change(smoother.take_change());
+  ASSERT_TRUE(change && change->linearised.size() == 2);
+  change->linearised[1].id = change->linearised[0].id;
+  RestoredGraph graph;
+  EXPECT_EQ(graph.apply(std::move(*change)), "a new keyframe has no estimate");
+  EXPECT_TRUE(graph.state.nodes.empty());
+}
+
 }  // namespace
 }  // namespace ignis

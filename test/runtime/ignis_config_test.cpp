@@ -48,5 +48,21 @@ TEST(IgnisConfig, FilterAndLoopGatesShareOneSectionAndAreCheckedTogether) {
   }
 }
 
+TEST(IgnisConfig, FilterAndGraphMustAgreeOnTheInertialUnit) {
+  const auto load = [](const char* text) { return config::load<IgnisConfig>(config::parse_json(text, "t")); };
+  try {
+    (void)load(
+        R"({"frontend": {"imu_noise_gyro": 0.004, "gravity_m": 9.8}, "backend": {"imu": {"accel_noise": 0.1}}})");
+    FAIL() << "no error";
+  } catch (const config::ConfigError& error) {
+    for (const char* part : {"backend.imu.gyro_noise", "frontend.imu_noise_gyro, 0.004", "backend.imu.gravity",
+                             "backend.imu.accel_noise", "frontend.imu_noise_accel, 0.06"}) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << part << " in " << error.what();
+    }
+  }
+  EXPECT_NO_THROW((void)load(R"({"frontend": {"imu_noise_gyro": 0.004}, "backend": {"imu": {"gyro_noise": 0.004}}})"));
+  EXPECT_NO_THROW((void)load(R"({"frontend": {"accel_bias_walk": 0.02}})"));
+}
+
 }  // namespace
 }  // namespace ignis::runtime

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/interval_information.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "frontend/scan_update.h"
+
+namespace ignis {
+namespace {
+
+/// From attitude in body axes and position in odom axes to both in body axes, at the attitude of `state`.
+Matrix6d to_body(const NavState& state) {
+  Matrix6d turn = Matrix6d::Identity();
+  turn.bottomRightCorner<3, 3>() = state.T_odom_body.rotation.conjugate().toRotationMatrix();
+  return turn;
+}
+
+/// Inverse of the covariance of a pose.
+Matrix6d pose_information(const Matrix15d& covariance) {
+  const Matrix6d pose = covariance.topLeftCorner<6, 6>();
+  return pose.ldlt().solve(Matrix6d::Identity());
+}
+
+/// The nearest positive semidefinite matrix, in units in which `reference` is the identity.
+Matrix6d without_negative_part(const Matrix6d& difference, const Matrix6d& reference) {
+  const Matrix6d root = reference.llt().matrixL();
+  const Matrix6d half = root.triangularView<Eigen::Lower>().solve(difference);
+  const Matrix6d scaled = root.triangularView<Eigen::Lower>().solve(half.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (scaled + scaled.transpose()));
+  const Matrix6d vectors = root * eigen.eigenvectors();
+  return vectors * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * vectors.transpose();
+}
+
+}  // namespace
+
+void IntervalInformation::begin(const FilterState& filter) {
+  state_ = filter.nominal;
+  with_scans_ = filter.covariance;
+  with_scans_.topRows<6>().setZero();
+  with_scans_.leftCols<6>().setZero();
+  without_scans_ = with_scans_;
+  sum_ = {};
+  samples_ = 0;
+  informed_ = false;
+}
+
+void IntervalInformation::add_imu(const ImuSample& sample) {
+  sum_.gyro += sample.gyro;
+  sum_.accel += sample.accel;
+  ++samples_;
+}
+
+InertialInput IntervalInformation::mean_input() const {
+  if (samples_ == 0) {
+    const Eigen::Vector3d up_body = state_.T_odom_body.rotation.conjugate() * Eigen::Vector3d::UnitY();
+    return {state_.angular_rate + state_.gyro_bias, config_.gravity_m * up_body + state_.accel_bias};
+  }
+  return {sum_.gyro / samples_, sum_.accel / samples_};
+}
+
+void IntervalInformation::add_scan(const NavState& state, const Matrix6d& information_body) {
+  const double dt = seconds_between(state_.utime, state.utime);
+  for (Matrix15d* covariance : {&with_scans_, &without_scans_}) {
+    FilterState filter{state_, *covariance};
+    predict(filter, mean_input(), dt, config_);
+    *covariance = filter.covariance;
+  }
+  state_ = state;
+  sum_ = {};
+  samples_ = 0;
+  if (information_body.isZero(0.0)) return;
+  PoseInformation scan;
+  scan.information = to_body(state).transpose() * information_body * to_body(state);
+  const UpdateStep update = information_update(with_scans_, Vector15d::Zero(), scan);
+  if (!update.ok) return;
+  with_scans_ = update.covariance;
+  informed_ = true;
+}
+
+Matrix6d IntervalInformation::information() const {
+  if (!informed_) return Matrix6d::Zero();
+  const Matrix6d known = pose_information(with_scans_);
+  const Matrix6d added = without_negative_part(known - pose_information(without_scans_), known);
+  const Matrix6d turn = to_body(state_);
+  return turn * added * turn.transpose();
+}
+
+}  // namespace ignis
