@@ -7,6 +7,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
@@ -31,6 +32,7 @@ constexpr double kRequestsPerSecond = 20.0;
 constexpr double kRequestBurst = 60.0;
 constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one step share pictures and frames
 constexpr std::chrono::seconds kLifeTimeout{10};
+constexpr std::chrono::milliseconds kSlowRoundTrip{500};
 
 SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
 
@@ -75,6 +77,8 @@ net::awaitable<void> ViewClient::read_loop() {
     if (!requests_.allow(last_life_)) too_demanding_ = true;
     if (!too_demanding_) handle(beast::buffers_to_string(buffer.data()));
     buffer.consume(buffer.size());
+    // The answer goes out before the next message is looked at, which may be one that ends the connection.
+    co_await net::post(stream_.get_executor(), net::use_awaitable);
     if (too_demanding_ || bad_requests_ > kMaxBadRequests) {
       ++context_.counters.policy_closes;
       co_await refuse(websocket::close_code::policy_error);
@@ -108,7 +112,7 @@ void ViewClient::on_control(websocket::frame_type kind) {
     const auto close_it = [self = shared_from_this()] { return self->refuse(websocket::close_code::policy_error); };
     net::co_spawn(stream_.get_executor(), close_it, net::detached);
   } else if (kind == websocket::frame_type::pong) {
-    awaits_pong_ = false;
+    if (std::exchange(awaits_pong_, false)) round_trip_ = last_life_ - batch_began_;
     wake();
   }
 }
@@ -160,25 +164,45 @@ net::awaitable<void> ViewClient::write_loop() {
   const auto self = shared_from_this();
   while (open_) {
     wrote_ = false;
-    if (!awaits_pong_ && !co_await write_news()) {
-      close();
-    } else if (!wrote_ && open_) {
-      co_await wake_.async_wait(kNoThrow);
-    }
+    // A failed write ends the writing alone: the reader may be in the middle of telling the viewer why it is closed.
+    if (!co_await (awaits_pong_ ? write_short_answers() : write_news())) co_return;
+    if (!wrote_ && open_) co_await wake_.async_wait(kNoThrow);
   }
 }
 
 net::awaitable<bool> ViewClient::write_news() {
+  batch_began_ = Clock::now();
   // Small texts go first: a large frame must not starve the state.
-  if (!co_await write_answers()) co_return false;
-  for (const SharedBytes& text : context_.board.take_texts(seen_)) {
-    if (!co_await write_message(false, text)) co_return false;
+  const bool is_slow = round_trip_ > kSlowRoundTrip;
+  if (!is_slow || !frame_is_next_) {
+    if (!co_await write_texts()) co_return false;
   }
-  if (!co_await write_frame()) co_return false;
+  frame_is_next_ = wrote_;
+  if (!is_slow || !wrote_) {
+    if (!co_await write_frame()) co_return false;
+  }
   if (!wrote_ || !open_) co_return true;
   awaits_pong_ = true;
   const auto [error] = co_await stream_.async_ping({}, kNoThrow);
   co_return !error;
+}
+
+net::awaitable<bool> ViewClient::write_texts() {
+  if (!co_await write_answers()) co_return false;
+  for (const SharedBytes& text : context_.board.take_texts(seen_)) {
+    if (!co_await write_message(false, text)) co_return false;
+  }
+  co_return true;
+}
+
+/// Texts alone need not wait for the pong of the batch before: their number is bounded by what the viewer asks.
+net::awaitable<bool> ViewClient::write_short_answers() {
+  while (!answers_.empty() && !answers_.front().binary) {
+    const Answer answer = std::move(answers_.front());
+    answers_.pop_front();
+    if (!co_await write_message(false, answer.text)) co_return false;
+  }
+  co_return true;
 }
 
 net::awaitable<bool> ViewClient::write_answers() {

@@ -43,7 +43,8 @@ struct Answer {
 
 /// One viewer. It goes and comes with the board: write what is newest, send a ping behind it, wait for the pong, look
 /// again. So at most one batch is under way, whatever buffers lie between, and what a slow viewer gets was newest when
-/// its previous batch had arrived. All calls on the server's thread.
+/// its previous batch had arrived. A batch is texts and a frame; a viewer that takes long gets texts and frames in
+/// turn, so that no frame ages behind texts. All calls on the server's thread.
 class ViewClient : public std::enable_shared_from_this<ViewClient> {
  public:
   using Stream = boost::beast::websocket::stream<boost::beast::tcp_stream>;
@@ -70,6 +71,8 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   boost::asio::awaitable<void> refuse(boost::beast::websocket::close_code code);
   boost::asio::awaitable<void> write_loop();
   boost::asio::awaitable<bool> write_news();
+  boost::asio::awaitable<bool> write_texts();
+  boost::asio::awaitable<bool> write_short_answers();
   boost::asio::awaitable<bool> write_answers();
   boost::asio::awaitable<bool> write_frame();
   boost::asio::awaitable<bool> write_message(bool binary, SharedBytes message);
@@ -91,6 +94,9 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   bool open_ = false;
   bool awaits_pong_ = false;
   bool wrote_ = false;
+  bool frame_is_next_ = false;  // of a slow viewer
+  TimePoint batch_began_{};
+  std::chrono::steady_clock::duration round_trip_{};  // of the last batch
   TimePoint last_life_ = std::chrono::steady_clock::now();
   std::uint64_t acknowledged_ = 0;
 };

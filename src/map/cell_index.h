@@ -20,12 +20,18 @@ struct CellIndex {
 /// A cell index as one number, for hash tables. Indices from -2^20 to 2^20 - 1 are told apart.
 using CellKey = std::uint64_t;
 
+inline constexpr int kKeyBits = 21;
+inline constexpr CellKey kKeyMask = (1ULL << kKeyBits) - 1;
+inline constexpr std::int32_t kKeyBias = 1 << (kKeyBits - 1);
+
 [[nodiscard]] constexpr CellKey pack(const CellIndex& cell) {
-  constexpr int kBits = 21;
-  constexpr CellKey kMask = (1ULL << kBits) - 1;
-  constexpr std::int32_t kBias = 1 << (kBits - 1);
-  const auto axis = [](std::int32_t index) { return static_cast<CellKey>(index + kBias) & kMask; };
-  return axis(cell.x) << (2 * kBits) | axis(cell.y) << kBits | axis(cell.z);
+  const auto axis = [](std::int32_t index) { return static_cast<CellKey>(index + kKeyBias) & kKeyMask; };
+  return axis(cell.x) << (2 * kKeyBits) | axis(cell.y) << kKeyBits | axis(cell.z);
+}
+
+[[nodiscard]] constexpr CellIndex unpack(CellKey key) {
+  const auto axis = [](CellKey bits) { return static_cast<std::int32_t>(bits & kKeyMask) - kKeyBias; };
+  return {axis(key >> (2 * kKeyBits)), axis(key >> kKeyBits), axis(key)};
 }
 
 }  // namespace ignis

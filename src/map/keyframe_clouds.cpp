@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <tuple>
+#include <utility>
 
 #include "common/grid.h"
 #include "map/tile_grid.h"
@@ -52,86 +55,106 @@ KeyframeClouds::Kept KeyframeClouds::add_keyframe(std::int32_t id, std::span<con
   if (is_newest) {
     close_newest();
     entries_[id] = {T_odom_keyframe, nullptr};
-    return {id, insert_open(points_body, Pose{})};
+    return {id, insert_open(points_body, Pose{}, false)};
   }
-  auto points = std::make_shared<std::vector<CloudPoint>>();
+  auto cloud = std::make_shared<CloudData>();
   for (const CloudPoint& point : points_body) {
-    if (const auto kept = sound(point.position.cast<double>(), point.intensity)) points->push_back(*kept);
+    if (const auto kept = sound(point.position.cast<double>(), point.intensity)) cloud->points.push_back(*kept);
   }
-  sort_by_block(*points);
-  closed_points_ += points->size();
-  const std::span<const CloudPoint> kept = *points;
-  entries_[id] = {T_odom_keyframe, std::move(points)};
+  sort_by_block(cloud->points);
+  closed_points_ += cloud->points.size();
+  const std::span<const CloudPoint> kept = cloud->points;
+  entries_[id] = {T_odom_keyframe, std::move(cloud)};
   return {id, kept};
 }
 
 KeyframeClouds::Kept KeyframeClouds::add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
   if (entries_.empty()) entries_[kBeforeFirst] = {T_odom_body, nullptr};
   const auto& [id, entry] = *entries_.rbegin();
-  return {id, insert_open(points_body, entry.T_odom_keyframe.inverse() * T_odom_body)};
+  return {id, insert_open(points_body, entry.T_odom_keyframe.inverse() * T_odom_body, true)};
 }
 
 std::span<const CloudPoint> KeyframeClouds::insert_open(std::span<const CloudPoint> points,
-                                                        const Pose& T_keyframe_points) {
+                                                        const Pose& T_keyframe_points, bool are_rays) {
   const std::size_t before = open_points_.size();
   const Eigen::Matrix3d R = T_keyframe_points.rotation.normalized().toRotationMatrix();
   const double per_metre = 1.0 / cell_m_;
   for (const CloudPoint& point : points) {
-    if (open_points_.size() >= max_points_) break;
     const Eigen::Vector3d p = R * point.position.cast<double>() + T_keyframe_points.translation;
     const auto kept = sound(p, point.intensity);
-    if (kept && open_cells_.insert(pack(cell_of(p, per_metre))).second) open_points_.push_back(*kept);
+    if (!kept) continue;
+    // The sensor stands near the body's origin; the few centimetres between are less than a cell.
+    if (open_free_ && are_rays) open_free_->add_ray(T_keyframe_points.translation, p);
+    if (open_free_ && !are_rays) open_free_->add_hit(p);
+    if (open_points_.size() < max_points_ && open_cells_.insert(pack(cell_of(p, per_metre))).second)
+      open_points_.push_back(*kept);
   }
   return std::span(open_points_).subspan(before);
 }
 
 void KeyframeClouds::close_newest() {
   if (entries_.empty()) return;
-  sort_by_block(open_points_);
-  open_points_.shrink_to_fit();
-  closed_points_ += open_points_.size();
-  entries_.rbegin()->second.points = std::make_shared<const std::vector<CloudPoint>>(std::move(open_points_));
-  open_points_ = {};
+  auto cloud = std::make_shared<CloudData>();
+  cloud->points = std::exchange(open_points_, {});
+  sort_by_block(cloud->points);
+  if (open_free_) cloud->free = open_free_->take();
+  closed_points_ += cloud->points.size();
+  free_cells_ += cloud->free.size();
+  entries_.rbegin()->second.cloud = std::move(cloud);
   open_cells_.clear();
 }
 
-std::vector<std::int32_t> KeyframeClouds::drop_farthest() {
+std::vector<std::int32_t> KeyframeClouds::beyond_bound() const {
   std::vector<std::int32_t> ids;
-  while (points() > max_points_ && entries_.size() > 1) {
-    const Eigen::Vector3d here = entries_.rbegin()->second.T_odom_keyframe.translation;
-    const auto distance = [&](const auto& entry) {
-      const Eigen::Vector3d offset = entry.second.T_odom_keyframe.translation - here;
-      return std::hypot(offset.x(), offset.z());
-    };
-    const auto farthest = std::ranges::max_element(entries_.begin(), std::prev(entries_.end()), {}, distance);
-    closed_points_ -= farthest->second.points->size();
-    ids.push_back(farthest->first);
-    entries_.erase(farthest);
-    ++dropped_;
+  if (points() <= max_points_) return ids;
+  std::vector<std::pair<double, std::int32_t>> by_distance;
+  const Eigen::Vector3d here = entries_.rbegin()->second.T_odom_keyframe.translation;
+  for (auto entry = entries_.begin(); entry != std::prev(entries_.end()); ++entry) {
+    const Eigen::Vector3d offset = entry->second.T_odom_keyframe.translation - here;
+    by_distance.emplace_back(std::hypot(offset.x(), offset.z()), entry->first);
+  }
+  std::ranges::sort(by_distance, std::greater{});
+  std::size_t left = points();
+  for (const auto& [distance, id] : by_distance) {
+    if (left <= max_points_) break;
+    left -= entries_.at(id).cloud->points.size();
+    ids.push_back(id);
   }
   return ids;
+}
+
+void KeyframeClouds::drop(std::span<const std::int32_t> ids) {
+  for (const std::int32_t id : ids) {
+    const auto entry = entries_.find(id);
+    closed_points_ -= entry->second.cloud->points.size();
+    free_cells_ -= entry->second.cloud->free.size();
+    entries_.erase(entry);
+    ++dropped_;
+  }
 }
 
 void KeyframeClouds::clear() {
   entries_.clear();
   open_points_ = {};
   open_cells_.clear();
-  closed_points_ = 0;
+  if (open_free_) std::ignore = open_free_->take();
+  closed_points_ = free_cells_ = 0;
 }
 
 std::size_t KeyframeClouds::bytes() const {
   return points() * sizeof(CloudPoint) + open_cells_.bucket_count() * (sizeof(CellKey) + 1) +
-         entries_.size() * sizeof(decltype(entries_)::value_type);
+         entries_.size() * sizeof(decltype(entries_)::value_type) + free_cells_ * sizeof(FreeCell) +
+         (open_free_ ? open_free_->bytes() : 0);
 }
 
-std::span<const CloudPoint> KeyframeClouds::points_of(std::int32_t id) const {
+StoredCloud KeyframeClouds::view(std::int32_t id) const {
   const Entry& entry = entries_.at(id);
-  return entry.points ? std::span<const CloudPoint>(*entry.points) : std::span<const CloudPoint>(open_points_);
+  return entry.cloud ? view_of(*entry.cloud) : StoredCloud{open_points_, {}};
 }
 
-std::shared_ptr<const std::vector<CloudPoint>> KeyframeClouds::share(std::int32_t id) const {
+SharedCloud KeyframeClouds::share(std::int32_t id) const {
   const Entry& entry = entries_.at(id);
-  return entry.points ? entry.points : std::make_shared<const std::vector<CloudPoint>>(open_points_);
+  return entry.cloud ? entry.cloud : std::make_shared<const CloudData>(CloudData{open_points_, {}});
 }
 
 }  // namespace ignis

@@ -12,7 +12,8 @@
 
 #include "common/measurements.h"
 #include "common/pose.h"
-#include "map/cell_index.h"
+#include "map/free_space.h"
+#include "map/stored_cloud.h"
 
 namespace ignis {
 
@@ -26,7 +27,7 @@ namespace ignis {
 ///
 /// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped,
 /// and when the open one alone is that large, it takes no more. Memory: 16 bytes per point, and for the open keyframe 9
-/// to 21 bytes per cell beside.
+/// to 21 bytes per cell beside. With rays followed, 4 bytes per free cell.
 class KeyframeClouds {
  public:
   static constexpr std::int32_t kBeforeFirst = -1;
@@ -39,6 +40,9 @@ class KeyframeClouds {
 
   KeyframeClouds(double cell_m, std::size_t max_points);
 
+  /// From here on the rays of the scans are followed as well, for the cells that they find free.
+  void follow_rays(FreeSpace free_space) { open_free_ = std::move(free_space); }
+
   /// Starts a keyframe; further scans are added to the keyframe with the highest id. A keyframe below that was lost on
   /// its way and sent again: its scans went to its predecessor. `id` is not in store.
   Kept add_keyframe(std::int32_t id, std::span<const CloudPoint> points_body, const Pose& T_odom_keyframe);
@@ -46,8 +50,9 @@ class KeyframeClouds {
   /// Adds a live scan to the newest keyframe.
   Kept add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body);
 
-  /// Drops the farthest clouds until the bound is kept; returns their ids.
-  std::vector<std::int32_t> drop_farthest();
+  /// The farthest clouds, as many as the bound asks to go.
+  [[nodiscard]] std::vector<std::int32_t> beyond_bound() const;
+  void drop(std::span<const std::int32_t> ids);
 
   void clear();
 
@@ -62,19 +67,20 @@ class KeyframeClouds {
   [[nodiscard]] std::optional<std::int32_t> open_id() const;
   [[nodiscard]] const Pose& T_odom_keyframe(std::int32_t id) const { return entries_.at(id).T_odom_keyframe; }
 
-  /// The points of a cloud in store, body frame of the keyframe.
-  [[nodiscard]] std::span<const CloudPoint> points_of(std::int32_t id) const;
+  /// A cloud in store.
+  [[nodiscard]] StoredCloud view(std::int32_t id) const;
 
   /// The same to keep, for another thread; the open one is copied.
-  [[nodiscard]] std::shared_ptr<const std::vector<CloudPoint>> share(std::int32_t id) const;
+  [[nodiscard]] SharedCloud share(std::int32_t id) const;
 
  private:
   struct Entry {
     Pose T_odom_keyframe;
-    std::shared_ptr<const std::vector<CloudPoint>> points;  // none while open
+    SharedCloud cloud;  // none while open
   };
 
-  std::span<const CloudPoint> insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points);
+  std::span<const CloudPoint> insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points,
+                                          bool are_rays);
   void close_newest();
 
   double cell_m_;
@@ -82,6 +88,8 @@ class KeyframeClouds {
   std::map<std::int32_t, Entry> entries_;
   std::vector<CloudPoint> open_points_;
   boost::unordered_flat_set<CellKey> open_cells_;
+  std::optional<FreeSpace> open_free_;
+  std::size_t free_cells_ = 0;  // of the closed ones
   std::size_t closed_points_ = 0;
   std::int64_t dropped_ = 0;
 };

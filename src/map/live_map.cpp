@@ -7,14 +7,18 @@ namespace ignis {
 
 ThreeLevelMap rebuild(const RebuildJob& job) {
   ThreeLevelMap map(job.config);
-  std::map<std::int32_t, std::span<const CloudPoint>> points;
-  const ThreeLevelMap::CloudLookup lookup = [&](std::int32_t id) { return points.at(id); };
+  std::map<std::int32_t, SharedCloud> store;
+  const ThreeLevelMap::CloudLookup lookup = [&](std::int32_t id) { return view_of(*store.at(id)); };
   map.set_coarsening(job.coarsening, lookup);
   map.place_windows(job.centre);
+  // All votes before the first point, so that nothing enters that would be carved.
   for (const PlacedCloud& cloud : job.clouds) {
-    points[cloud.id] = *cloud.points;
+    store[cloud.id] = cloud.cloud;
     map.add_cloud(cloud.id, cloud.T_map_keyframe);
-    map.insert(cloud.id, *cloud.points);
+    if (cloud.id != job.open_cloud) map.cast_votes(cloud.id, lookup);
+  }
+  for (const PlacedCloud& cloud : job.clouds) {
+    map.insert(cloud.id, cloud.cloud->points);
     map.stay_within_bound(lookup);
   }
   map.set_open_cloud(job.open_cloud);
@@ -24,10 +28,12 @@ ThreeLevelMap rebuild(const RebuildJob& job) {
 LiveMap::LiveMap(const MapConfig& config)
     : config_(config),
       map_(config),
-      clouds_(config.local_cell_m, static_cast<std::size_t>(config.max_keyframe_points)) {}
+      clouds_(config.local_cell_m, static_cast<std::size_t>(config.max_keyframe_points)) {
+  if (config.carve_free_space) clouds_.follow_rays(FreeSpace(config.mid_cell_m, config.carve_rays));
+}
 
 ThreeLevelMap::CloudLookup LiveMap::lookup() const {
-  return [this](std::int32_t id) { return clouds_.points_of(id); };
+  return [this](std::int32_t id) { return clouds_.view(id); };
 }
 
 InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
@@ -57,6 +63,7 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   node.T_odom_keyframe = T_odom_keyframe;
   if (!node.corrected) node.T_map_keyframe = T_map_odom_ * T_odom_keyframe;
   show(clouds_.add_keyframe(keyframe.id, keyframe.cloud, T_odom_keyframe));
+  cast_votes();
   drop_far_clouds();
   settle();  // the first keyframe tells where what came before belongs
   return true;
@@ -72,10 +79,21 @@ InsertCounts LiveMap::show(const KeyframeClouds::Kept& kept) {
   return counts;
 }
 
+/// Whoever has just been closed says what it found free.
+void LiveMap::cast_votes() {
+  if (!config_.carve_free_space) return;
+  for (const std::int32_t id : map_.cloud_ids()) {
+    if (id != clouds_.open_id() && !map_.has_voted(id)) map_.cast_votes(id, lookup());
+  }
+}
+
+/// Not while a map is being built from them.
 void LiveMap::drop_far_clouds() {
-  std::vector<std::int32_t> dropped = clouds_.drop_farthest();
-  std::erase_if(dropped, [this](std::int32_t id) { return !map_.contains(id); });
-  if (!dropped.empty()) map_.remove_clouds(dropped, lookup());
+  if (rebuilding_) return;
+  const std::vector<std::int32_t> ids = clouds_.beyond_bound();
+  if (ids.empty()) return;
+  map_.remove_clouds(ids, lookup());
+  clouds_.drop(ids);
 }
 
 void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision) {
@@ -142,19 +160,17 @@ void LiveMap::finish_rebuild(ThreeLevelMap map) {
   map_ = std::move(map);
   rebuilding_ = false;
   for (const Arrival& arrival : std::exchange(arrivals_, {})) {
-    if (!clouds_.contains(arrival.id)) continue;
     if (!map_.contains(arrival.id)) map_.add_cloud(arrival.id, newest_pose(arrival.id));
     map_.insert(arrival.id, arrival.points);
   }
-  std::vector<std::int32_t> dropped = map_.cloud_ids();
-  std::erase_if(dropped, [this](std::int32_t id) { return clouds_.contains(id); });
-  if (!dropped.empty()) map_.remove_clouds(dropped, lookup());
   map_.set_open_cloud(clouds_.open_id());
+  cast_votes();
   map_.follow(T_map_body().translation, lookup());
   map_.stay_within_bound(lookup());
   drawn_revision_ = rebuilt_revision_;
   ++rebuilds_;
   settle();
+  drop_far_clouds();
 }
 
 void LiveMap::clear() {
@@ -219,7 +235,7 @@ std::vector<Eigen::Vector3f> LiveMap::placed_cloud(std::int32_t id) const {
   std::vector<Eigen::Vector3f> points;
   if (id < 0 || !clouds_.contains(id)) return points;
   const Pose T_map_keyframe = newest_pose(id);
-  for (const CloudPoint& point : clouds_.points_of(id)) {
+  for (const CloudPoint& point : clouds_.view(id).points) {
     points.emplace_back((T_map_keyframe * Eigen::Vector3d(point.position.cast<double>())).cast<float>());
   }
   return points;

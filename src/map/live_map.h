@@ -22,10 +22,10 @@ struct CorrectedPose {
   Pose T_map_keyframe;
 };
 
-/// A cloud and where it belongs. The points are shared: a rebuild reads them on another thread while nobody writes.
+/// A cloud and where it belongs.
 struct PlacedCloud {
   std::int32_t id = 0;
-  std::shared_ptr<const std::vector<CloudPoint>> points;  ///< body frame of the keyframe
+  SharedCloud cloud;
   Pose T_map_keyframe;
 };
 
@@ -118,6 +118,7 @@ class LiveMap {
   [[nodiscard]] bool differs(const Pose& a, const Pose& b) const;
   [[nodiscard]] ThreeLevelMap::CloudLookup lookup() const;
   InsertCounts show(const KeyframeClouds::Kept& kept);
+  void cast_votes();
   void drop_far_clouds();
   void settle();
 

@@ -24,6 +24,9 @@ struct MapConfig {
   double rebuild_shift_m = 0.005;
   double rebuild_turn_rad = 0.001;
   int reanchor_points = 300'000;
+  bool carve_free_space = false;
+  int carve_rays = 10;
+  int carve_keyframes = 2;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.number("local_cell_m", self.local_cell_m, {0.01, 2.0}, "m", "cell of the local level");
@@ -47,6 +50,12 @@ struct MapConfig {
                  "keyframe turn up to which its voxels stay where they are");
     visit.integer("reanchor_points", self.reanchor_points, {0, 100'000'000}, "points",
                   "a correction that would read more stored points than this is built aside");
+    visit.flag("carve_free_space", self.carve_free_space,
+               "leave out points in places that were later seen to be empty");
+    visit.integer("carve_rays", self.carve_rays, {1, 1000}, "rays",
+                  "rays of one keyframe's scans through a mid cell that make it empty for this keyframe");
+    visit.integer("carve_keyframes", self.carve_keyframes, {1, 100}, "keyframes",
+                  "keyframes that must find a mid cell empty before its points go");
   }
 
   /// Cells must nest (a voxel of one level lies in exactly one of the next), windows must grow, and the cell indices of

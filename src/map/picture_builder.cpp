@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "map/voxel_checksum.h"
+
 namespace ignis {
 namespace {
 
@@ -65,18 +67,24 @@ TilePicture PictureBuilder::show(const ThreeLevelMap& map, const Tile& tile, con
   }
   for (std::size_t i = 0; i < kLevels; ++i) {
     if (reach[i] == Reach::kOutside) continue;
+    const int n = grid.cells_per_tile[i];
     std::vector<std::uint64_t>& voxels = picture.voxels[i];
-    for (const auto& [cell, voxel] : tile.level(i)) {
-      if (i > 0 && covered_[i][cell] != 0) continue;
-      const Eigen::Vector3d centre = grid.centre_of(i, grid.world_cell(i, tile.index(), cell));
+    voxels.reserve(tile.level(i).size());
+    for (const auto& [number, voxel] : tile.level(i)) {
+      if (i > 0 && covered_[i][number] != 0) continue;
+      const CellIndex within = grid.split(i, number);
+      const CellIndex cell{tile.index().x * n + within.x, tile.index().y * n + within.y, tile.index().z * n + within.z};
+      const Eigen::Vector3d centre = grid.centre_of(i, cell);
       if (reach[i] == Reach::kPartly && !map.windows().contains(radii[i], centre)) continue;
-      voxels.push_back(TileVoxel::pack(cell, byte_of(voxel.intensity), voxel.keyframe_id == map.open_cloud()));
+      const std::uint8_t intensity = byte_of(voxel.intensity);
+      const bool live = voxel.keyframe_id == map.open_cloud();
+      voxels.push_back(TileVoxel::pack(number, intensity, live));
+      picture.checksum += voxel_checksum(i, cell, intensity, live);
       picture.heights[i].add(centre.y() + static_cast<double>(voxel.from_centre.y()));
-      for (std::size_t k = i + 1; k < kLevels; ++k) covered_[k][map.locator().parent_in_tile(i, k, cell)] = 1;
+      for (std::size_t k = i + 1; k < kLevels; ++k) covered_[k][map.locator().parent_in_tile(i, k, within)] = 1;
     }
     std::ranges::sort(voxels);
   }
-  picture.checksum = checksum_of(picture, grid);
   return picture;
 }
 

@@ -113,6 +113,7 @@ Tile& ThreeLevelMap::tile_of(CellKey key, const CellIndex& index) {
 }
 
 void ThreeLevelMap::enter(Tile& tile, const Location& location, LevelSet levels, float intensity, std::int32_t id) {
+  if (is_carved(tile, location.cell_in_tile[1])) return;
   for (std::size_t i = 0; i < kLevels; ++i) {
     if (!has(levels, i)) continue;
     const Voxel voxel{location.from_centre[i], intensity, id};
@@ -127,7 +128,7 @@ void ThreeLevelMap::clear_levels(Tile& tile, LevelSet levels) {
 }
 
 void ThreeLevelMap::add_cloud(std::int32_t id, const Pose& T_world_cloud) {
-  clouds_[id] = {T_world_cloud, {}};
+  clouds_[id] = {.T_world_cloud = T_world_cloud, .tiles = {}};
   if (!placed_) place_windows(T_world_cloud.translation);
 }
 
@@ -152,6 +153,40 @@ InsertCounts ThreeLevelMap::insert(std::int32_t id, std::span<const CloudPoint> 
   return counts;
 }
 
+bool ThreeLevelMap::is_carved(const Tile& tile, std::uint32_t mid_cell) const {
+  return !tile.votes.empty() && tile.votes[mid_cell] >= config_.carve_keyframes;
+}
+
+/// Adds or takes back a cloud's votes; lists the tiles in which a cell is carved now and was not, or the reverse.
+void ThreeLevelMap::count_votes(const Cloud& cloud, std::span<const FreeCell> free, int sign,
+                                std::vector<CellKey>& changed) {
+  const auto threshold = static_cast<std::uint16_t>(config_.carve_keyframes - (sign < 0 ? 1 : 0));
+  const auto cells = static_cast<std::size_t>(grid_.cells_per_tile[1]);
+  Tile* tile = nullptr;
+  for (const FreeCell cell : free) {
+    const Eigen::Vector3d p_world = cloud.T_world_cloud * grid_.centre_of(1, unpack_free_cell(cell));
+    if (!(p_world.cwiseAbs().maxCoeff() < kMaxCoordinate)) continue;
+    const Location location = locator_.locate(p_world);
+    if (tile == nullptr || tile->index() != location.tile) tile = &tile_of(pack(location.tile), location.tile);
+    if (tile->votes.empty()) tile->votes.resize(cells * cells * cells);
+    std::uint16_t& votes = tile->votes[location.cell_in_tile[1]];
+    votes = static_cast<std::uint16_t>(votes + sign);
+    const CellKey key = pack(location.tile);
+    if (votes == threshold && !tile->clouds.empty() && (changed.empty() || changed.back() != key)) {
+      changed.push_back(key);
+    }
+  }
+}
+
+void ThreeLevelMap::cast_votes(std::int32_t id, const CloudLookup& clouds) {
+  Cloud& cloud = clouds_.at(id);
+  if (cloud.has_voted) return;
+  cloud.has_voted = true;
+  std::vector<CellKey> changed;
+  count_votes(cloud, clouds(id).free, +1, changed);
+  refill_all_levels(changed, clouds);
+}
+
 void ThreeLevelMap::leave_tiles(std::int32_t id, std::vector<CellKey>& left) {
   std::vector<CellKey>& tiles = clouds_.at(id).tiles;
   for (const CellKey key : tiles) std::erase(tiles_.at(key)->clouds, id);
@@ -164,9 +199,11 @@ void ThreeLevelMap::move_clouds(std::span<const std::pair<std::int32_t, Pose>> m
   for (const auto& [id, T_world_cloud] : moved) {
     leave_tiles(id, touched);
     Cloud& cloud = clouds_.at(id);
+    if (cloud.has_voted) count_votes(cloud, clouds(id).free, -1, touched);
     cloud.T_world_cloud = T_world_cloud;
+    if (cloud.has_voted) count_votes(cloud, clouds(id).free, +1, touched);
     const Tile* newest = nullptr;
-    for_each_placed(T_world_cloud, clouds(id), [&](const CloudPoint&, const Location& location) {
+    for_each_placed(T_world_cloud, clouds(id).points, [&](const CloudPoint&, const Location& location) {
       if (newest != nullptr && newest->index() == location.tile) return;
       const CellKey key = pack(location.tile);
       Tile& tile = tile_of(key, location.tile);
@@ -177,10 +214,7 @@ void ThreeLevelMap::move_clouds(std::span<const std::pair<std::int32_t, Pose>> m
     });
     touched.insert(touched.end(), cloud.tiles.begin(), cloud.tiles.end());
   }
-  std::ranges::sort(touched);
-  touched.erase(std::ranges::unique(touched).begin(), touched.end());
-  for (const CellKey key : touched) tiles_.at(key)->refilling = tiles_.at(key)->held;
-  refill(touched, clouds);
+  refill_all_levels(touched, clouds);
   stay_within_bound(clouds);
 }
 
@@ -188,12 +222,18 @@ void ThreeLevelMap::remove_clouds(std::span<const std::int32_t> ids, const Cloud
   std::vector<CellKey> left;
   for (const std::int32_t id : ids) {
     leave_tiles(id, left);
+    const Cloud& cloud = clouds_.at(id);
+    if (cloud.has_voted) count_votes(cloud, clouds(id).free, -1, left);
     clouds_.erase(id);
   }
-  std::ranges::sort(left);
-  left.erase(std::ranges::unique(left).begin(), left.end());
-  for (const CellKey key : left) tiles_.at(key)->refilling = tiles_.at(key)->held;
-  refill(left, clouds);
+  refill_all_levels(left, clouds);
+}
+
+void ThreeLevelMap::refill_all_levels(std::vector<CellKey>& tiles, const CloudLookup& clouds) {
+  std::ranges::sort(tiles);
+  tiles.erase(std::ranges::unique(tiles).begin(), tiles.end());
+  for (const CellKey key : tiles) tiles_.at(key)->refilling = tiles_.at(key)->held;
+  refill(tiles, clouds);
 }
 
 /// Empties the levels that are marked in these tiles and offers them the points of all clouds that touch them.
@@ -210,15 +250,17 @@ void ThreeLevelMap::refill(const std::vector<CellKey>& tiles, const CloudLookup&
   ids.erase(std::ranges::unique(ids).begin(), ids.end());
   for (const std::int32_t id : ids) {
     Tile* tile = nullptr;
-    for_each_placed(clouds_.at(id).T_world_cloud, clouds(id), [&](const CloudPoint& point, const Location& location) {
-      if (tile == nullptr || tile->index() != location.tile) tile = tiles_.at(pack(location.tile)).get();
-      if (tile->refilling != 0) enter(*tile, location, tile->refilling, point.intensity, id);
-    });
+    for_each_placed(clouds_.at(id).T_world_cloud, clouds(id).points,
+                    [&](const CloudPoint& point, const Location& location) {
+                      if (tile == nullptr || tile->index() != location.tile)
+                        tile = tiles_.at(pack(location.tile)).get();
+                      if (tile->refilling != 0) enter(*tile, location, tile->refilling, point.intensity, id);
+                    });
   }
   for (const CellKey key : tiles) {
     Tile& tile = *tiles_.at(key);
     tile.refilling = 0;
-    if (tile.clouds.empty()) tiles_.erase(key);
+    if (tile.clouds.empty() && tile.votes.empty()) tiles_.erase(key);
   }
 }
 
@@ -226,7 +268,7 @@ std::size_t ThreeLevelMap::cost_of_moving(std::span<const std::int32_t> ids, con
   std::vector<std::int32_t> readers;
   std::size_t cost = 0;
   for (const std::int32_t id : ids) {
-    cost += clouds(id).size();
+    cost += clouds(id).points.size();
     for (const CellKey key : clouds_.at(id).tiles) {
       const Tile& tile = *tiles_.at(key);
       if (tile.held != 0) readers.insert(readers.end(), tile.clouds.begin(), tile.clouds.end());
@@ -234,7 +276,7 @@ std::size_t ThreeLevelMap::cost_of_moving(std::span<const std::int32_t> ids, con
     std::ranges::sort(readers);
     readers.erase(std::ranges::unique(readers).begin(), readers.end());
   }
-  for (const std::int32_t id : readers) cost += clouds(id).size();
+  for (const std::int32_t id : readers) cost += clouds(id).points.size();
   return cost;
 }
 

@@ -16,6 +16,7 @@
 #include "common/measurements.h"
 #include "common/pose.h"
 #include "map/map_config.h"
+#include "map/stored_cloud.h"
 #include "map/tile.h"
 #include "map/windows.h"
 
@@ -45,8 +46,8 @@ struct InsertCounts {
 /// Not thread-safe; no clocks, no files.
 class ThreeLevelMap {
  public:
-  /// The points of a cloud, in its body frame. Asked for clouds that were added and not removed.
-  using CloudLookup = std::function<std::span<const CloudPoint>(std::int32_t id)>;
+  /// What is stored of a cloud, in its body frame. Asked for clouds that were added and not removed.
+  using CloudLookup = std::function<StoredCloud(std::int32_t id)>;
 
   explicit ThreeLevelMap(const MapConfig& config);
 
@@ -59,6 +60,11 @@ class ThreeLevelMap {
   /// A cloud that stands here; its points follow. `id` is new, the pose usable().
   void add_cloud(std::int32_t id, const Pose& T_world_cloud);
   InsertCounts insert(std::int32_t id, std::span<const CloudPoint> points_cloud);
+
+  /// The cloud is closed, and what its rays found free counts from now on: a point lies in no level when
+  /// `carve_keyframes` keyframes found its mid cell free. (None of them can be its own, which has hit the cell.)
+  void cast_votes(std::int32_t id, const CloudLookup& clouds);
+  [[nodiscard]] bool has_voted(std::int32_t id) const { return clouds_.at(id).has_voted; }
 
   /// Puts clouds elsewhere and fills what they leave and where they arrive.
   void move_clouds(std::span<const std::pair<std::int32_t, Pose>> moved, const CloudLookup& clouds);
@@ -112,6 +118,7 @@ class ThreeLevelMap {
   struct Cloud {
     Pose T_world_cloud;
     std::vector<CellKey> tiles;  // each once
+    bool has_voted = false;
   };
   using Tiles = boost::unordered_flat_map<CellKey, std::unique_ptr<Tile>>;
 
@@ -119,7 +126,10 @@ class ThreeLevelMap {
   void apply_windows(const CloudLookup& clouds);
   Tile& tile_of(CellKey key, const CellIndex& index);
   void enter(Tile& tile, const Location& location, LevelSet levels, float intensity, std::int32_t id);
+  [[nodiscard]] bool is_carved(const Tile& tile, std::uint32_t mid_cell) const;
   void leave_tiles(std::int32_t id, std::vector<CellKey>& left);
+  void count_votes(const Cloud& cloud, std::span<const FreeCell> free, int sign, std::vector<CellKey>& changed);
+  void refill_all_levels(std::vector<CellKey>& tiles, const CloudLookup& clouds);
   void refill(const std::vector<CellKey>& tiles, const CloudLookup& clouds);
   void clear_levels(Tile& tile, LevelSet levels);
 

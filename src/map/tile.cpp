@@ -14,7 +14,8 @@ std::size_t Tile::clear(LevelSet levels) {
 }
 
 std::size_t Tile::bytes() const {
-  std::size_t bytes = sizeof(Tile) + clouds.capacity() * sizeof(std::int32_t);
+  std::size_t bytes =
+      sizeof(Tile) + clouds.capacity() * sizeof(std::int32_t) + votes.capacity() * sizeof(std::uint16_t);
   for (const Level& level : levels_) bytes += level.bucket_count() * (sizeof(Level::value_type) + 1);
   return bytes;
 }

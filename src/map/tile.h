@@ -47,6 +47,9 @@ class Tile {
   LevelSet refilling = 0;            ///< levels that are being filled from the clouds
   std::vector<std::int32_t> clouds;  ///< keyframes with points here, each once
 
+  /// Of each mid cell, how many keyframes found it free; empty as long as none did.
+  std::vector<std::uint16_t> votes;
+
   /// Changes whenever what the tile shows may have changed.
   [[nodiscard]] std::uint64_t version() const { return version_; }
   void touch(std::uint64_t stamp) { version_ = stamp; }

@@ -27,8 +27,23 @@ struct TileGrid {
 
   [[nodiscard]] double tile_m() const { return cell_m[0] * cells_per_tile[0]; }
 
+  /// Where in its tile the cell of a number lies, along each axis.
+  [[nodiscard]] CellIndex split(std::size_t level, std::uint32_t cell_in_tile) const {
+    // By multiplication: three divisions a voxel were most of what a picture cost. Half a unit away from every
+    // multiple, no rounding can reach the wrong one.
+    const int n = cells_per_tile[level];
+    const double per_cell = 1.0 / n;
+    const int rows = static_cast<int>((static_cast<double>(cell_in_tile) + 0.5) * per_cell);
+    const int x = static_cast<int>((static_cast<double>(rows) + 0.5) * per_cell);
+    return {x, rows - x * n, static_cast<int>(cell_in_tile) - rows * n};
+  }
+
   /// The cell of the world that a number within a tile stands for.
-  [[nodiscard]] CellIndex world_cell(std::size_t level, const CellIndex& tile, std::uint32_t cell_in_tile) const;
+  [[nodiscard]] CellIndex world_cell(std::size_t level, const CellIndex& tile, std::uint32_t cell_in_tile) const {
+    const int n = cells_per_tile[level];
+    const CellIndex cell = split(level, cell_in_tile);
+    return {tile.x * n + cell.x, tile.y * n + cell.y, tile.z * n + cell.z};
+  }
 
   /// Its number within its tile.
   [[nodiscard]] std::uint32_t cell_in_tile(std::size_t level, const CellIndex& tile, const CellIndex& cell) const;
@@ -75,8 +90,13 @@ class PointLocator {
 
   [[nodiscard]] CellIndex cell_of(std::size_t level, const Eigen::Vector3d& p_world) const;
 
-  /// The number of the cell of level `to` that contains a cell of the finer level `from`, both within their tile.
-  [[nodiscard]] std::uint32_t parent_in_tile(std::size_t from, std::size_t to, std::uint32_t cell_in_tile) const;
+  /// The number of the cell of level `to` that contains a cell of the finer level `from`, given as split() has it.
+  [[nodiscard]] std::uint32_t parent_in_tile(std::size_t from, std::size_t to, const CellIndex& split) const {
+    const std::vector<std::uint32_t>& parents = parents_[from][to];
+    const auto m = static_cast<std::uint32_t>(grid_.cells_per_tile[to]);
+    const auto of = [&](std::int32_t cell) { return parents[static_cast<std::size_t>(cell)]; };
+    return (of(split.x) * m + of(split.y)) * m + of(split.z);
+  }
 
  private:
   struct Axis {
@@ -89,14 +109,14 @@ class PointLocator {
     // Half a cell away from every multiple, so that no rounding can reach the wrong tile.
     const int tile = floor_to_int((static_cast<double>(local) + 0.5) * tiles_per_local_);
     const auto within = static_cast<std::uint32_t>(local - tile * grid_.cells_per_tile[0]);
-    return {tile, {within, mid_of_local_[within], coarse_of_local_[within]}};
+    return {tile, {within, parents_[0][1][within], parents_[0][2][within]}};
   }
 
   TileGrid grid_;
   double local_per_m_;
   double tiles_per_local_;
-  std::vector<std::uint32_t> mid_of_local_;
-  std::vector<std::uint32_t> coarse_of_local_;
+  // Along one axis of a tile: which cell of the second level contains a cell of the first.
+  std::array<std::array<std::vector<std::uint32_t>, kLevels>, kLevels> parents_;
 };
 
 }  // namespace ignis

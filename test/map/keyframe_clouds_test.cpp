@@ -24,10 +24,10 @@ TEST(KeyframeClouds, KeepsLiveScansInTheFrameOfTheNewestKeyframe) {
   const KeyframeClouds::Kept kept = clouds.add_scan(std::span(&point, 1), T_odom_body);
   EXPECT_EQ(kept.id, 0);
   ASSERT_EQ(kept.points.size(), 1U);
-  ASSERT_EQ(clouds.points_of(0).size(), 1U);
+  ASSERT_EQ(clouds.view(0).points.size(), 1U);
   const Eigen::Vector3d p_odom = T_odom_keyframe * Eigen::Vector3d(kept.points[0].position.cast<double>());
   EXPECT_LT((p_odom - T_odom_body * Eigen::Vector3d(2, 1, -3)).norm(), 1e-5);
-  EXPECT_FLOAT_EQ(clouds.points_of(0)[0].intensity, 42.0F);
+  EXPECT_FLOAT_EQ(clouds.view(0).points[0].intensity, 42.0F);
 }
 
 TEST(KeyframeClouds, KeepsTheFirstPointOfACellAndSaysSo) {
@@ -48,10 +48,10 @@ TEST(KeyframeClouds, WhatIsSeenBeforeTheFirstKeyframeHasAStandIn) {
   const CloudPoint point{{2.0F, 1.0F, -3.0F}, 42.0F};
   EXPECT_EQ(clouds.add_scan(std::span(&point, 1), pose_at(1, 2, 3)).id, KeyframeClouds::kBeforeFirst);
   EXPECT_EQ(clouds.open_id(), KeyframeClouds::kBeforeFirst);
-  EXPECT_EQ(clouds.points_of(KeyframeClouds::kBeforeFirst)[0].position, point.position);
+  EXPECT_EQ(clouds.view(KeyframeClouds::kBeforeFirst).points[0].position, point.position);
   clouds.add_keyframe(0, {}, pose_at(4, 0, 0));
   EXPECT_EQ(clouds.open_id(), 0);
-  EXPECT_EQ(clouds.points_of(KeyframeClouds::kBeforeFirst).size(), 1U);
+  EXPECT_EQ(clouds.view(KeyframeClouds::kBeforeFirst).points.size(), 1U);
 }
 
 TEST(KeyframeClouds, ClosingLosesAndAddsNothing) {
@@ -61,7 +61,7 @@ TEST(KeyframeClouds, ClosingLosesAndAddsNothing) {
   clouds.add_scan(random_cloud(generator, 500, 5, 2), pose_at(1, 0, 0));
   const auto as_set = [&] {
     std::vector<std::array<float, 4>> points;
-    for (const CloudPoint& p : clouds.points_of(0)) {
+    for (const CloudPoint& p : clouds.view(0).points) {
       points.push_back({p.position.x(), p.position.y(), p.position.z(), p.intensity});
     }
     std::ranges::sort(points);
@@ -73,7 +73,7 @@ TEST(KeyframeClouds, ClosingLosesAndAddsNothing) {
   EXPECT_EQ(as_set(), open);
   clouds.add_scan(random_cloud(generator, 100, 5, 2), pose_at(5, 0, 0));
   EXPECT_EQ(as_set(), open);
-  EXPECT_EQ(clouds.points(), open.size() + clouds.points_of(1).size());
+  EXPECT_EQ(clouds.points(), open.size() + clouds.view(1).points.size());
 }
 
 TEST(KeyframeClouds, ASharedCloudDoesNotChangeAnyMore) {
@@ -81,10 +81,10 @@ TEST(KeyframeClouds, ASharedCloudDoesNotChangeAnyMore) {
   KeyframeClouds clouds(kCell, 1'000'000);
   clouds.add_keyframe(0, random_cloud(generator, 50, 5, 2), Pose{});
   const auto shared = clouds.share(0);
-  const std::size_t size = shared->size();
+  const std::size_t size = shared->points.size();
   clouds.add_scan(random_cloud(generator, 50, 5, 2), Pose{});
-  EXPECT_EQ(shared->size(), size);
-  EXPECT_GT(clouds.share(0)->size(), size);
+  EXPECT_EQ(shared->points.size(), size);
+  EXPECT_GT(clouds.share(0)->points.size(), size);
 }
 
 TEST(KeyframeClouds, TakesAKeyframeThatComesLateAsItIs) {
@@ -93,7 +93,7 @@ TEST(KeyframeClouds, TakesAKeyframeThatComesLateAsItIs) {
   clouds.add_keyframe(0, random_cloud(generator, 50, 5, 2), pose_at(0, 0, 0));
   clouds.add_keyframe(2, random_cloud(generator, 50, 5, 2), pose_at(8, 0, 0));
   EXPECT_EQ(clouds.add_keyframe(1, random_cloud(generator, 60, 5, 2), pose_at(4, 0, 0)).points.size(), 60U);
-  EXPECT_EQ(clouds.points_of(1).size(), 60U);
+  EXPECT_EQ(clouds.view(1).points.size(), 60U);
   EXPECT_EQ(clouds.open_id(), 2);
 }
 
@@ -106,10 +106,22 @@ TEST(KeyframeClouds, LeavesOutPointsThatNoMapCanHoldAndMendsIntensities) {
                                          {{2.0F, 0.0F, 0.0F}, 1e9F},
                                          {{3.0F, 0.0F, 0.0F}, -5.0F}};
   clouds.add_keyframe(0, cloud, Pose{});
-  ASSERT_EQ(clouds.points_of(0).size(), 3U);
-  EXPECT_EQ(clouds.points_of(0)[0].intensity, 0.0F);
-  EXPECT_EQ(clouds.points_of(0)[1].intensity, 255.0F);
-  EXPECT_EQ(clouds.points_of(0)[2].intensity, 0.0F);
+  ASSERT_EQ(clouds.view(0).points.size(), 3U);
+  EXPECT_EQ(clouds.view(0).points[0].intensity, 0.0F);
+  EXPECT_EQ(clouds.view(0).points[1].intensity, 255.0F);
+  EXPECT_EQ(clouds.view(0).points[2].intensity, 0.0F);
+}
+
+TEST(KeyframeClouds, SaysWhatTheRaysOfItsScansFoundFree) {
+  KeyframeClouds clouds(kCell, 1'000'000);
+  clouds.follow_rays(FreeSpace(0.25, 3));
+  const std::vector<CloudPoint> wall = {{{0.05F, 0.0F, -3.0F}, 1.0F}};
+  clouds.add_keyframe(0, wall, Pose{});
+  for (int i = 0; i < 3; ++i) clouds.add_scan(wall, Pose{});
+  EXPECT_TRUE(clouds.view(0).free.empty()) << "not known before the keyframe is closed";
+  clouds.add_keyframe(1, {}, Pose{});
+  EXPECT_GT(clouds.view(0).free.size(), 8U);
+  for (const FreeCell cell : clouds.view(0).free) EXPECT_GT(unpack_free_cell(cell).z, -11);
 }
 
 TEST(KeyframeClouds, DropsTheFarthestCloudWhenFull) {
@@ -118,7 +130,8 @@ TEST(KeyframeClouds, DropsTheFarthestCloudWhenFull) {
   std::vector<std::int32_t> dropped;
   for (int id = 0; id < 20; ++id) {
     clouds.add_keyframe(id, random_cloud(generator, 200, 9, 4), pose_at(4 * id, 0, 0));
-    const auto now = clouds.drop_farthest();
+    const auto now = clouds.beyond_bound();
+    clouds.drop(now);
     dropped.insert(dropped.end(), now.begin(), now.end());
     ASSERT_LE(clouds.points(), 1'000U);
   }
@@ -134,7 +147,7 @@ TEST(KeyframeClouds, AnOpenKeyframeAloneStaysWithinTheBoundToo) {
   KeyframeClouds clouds(kCell, 1'000);
   for (int i = 0; i < 20; ++i) {
     clouds.add_scan(random_cloud(generator, 200, 9, 4), Pose{});
-    clouds.drop_farthest();
+    EXPECT_TRUE(clouds.beyond_bound().empty()) << "the newest stays";
   }
   EXPECT_EQ(clouds.points(), 1'000U);
 }

@@ -171,6 +171,29 @@ TEST(MapInvariant, HoldsWhenTheMapMustCoarsen) {
   EXPECT_GT(coarsening, 0);
 }
 
+TEST(MapInvariant, HoldsWhenFreeSpaceIsCarved) {
+  MapConfig config = small_world();
+  config.carve_free_space = true;
+  config.carve_rays = 1;
+  config.max_keyframe_points = 10'000;
+  for (const int keyframes : {1, 2}) {
+    config.carve_keyframes = keyframes;
+    for (std::uint32_t seed = 51; seed <= 54; ++seed) {
+      RandomDrive drive(seed, config);
+      for (int step = 0; step < 150; ++step) {
+        drive.step();
+        if (step % 10 == 0) expect_invariant(drive.map(), seed, step);
+        if (HasFatalFailure()) return;
+      }
+      drive.finish();
+      const RebuildJob job = drive.map().as_drawn();
+      const auto levels = test::oracle_levels(job);
+      for (std::size_t i = 0; i < kLevels; ++i) EXPECT_EQ(drive.map().voxels().sorted(i).size(), levels[i].size());
+      EXPECT_TRUE(std::ranges::any_of(test::oracle_votes(job), [&](const auto& v) { return v.second >= keyframes; }));
+    }
+  }
+}
+
 TEST(MapInvariant, ViewsEqualTheDefinitionAfterAnySequence) {
   for (std::uint32_t seed = 41; seed <= 43; ++seed) {
     RandomDrive drive(seed, small_world());

@@ -38,15 +38,30 @@ inline double horizontal_distance(const Eigen::Vector3d& a, const Eigen::Vector3
   return std::hypot(a.x() - b.x(), a.z() - b.z());
 }
 
+/// How many closed keyframes found each mid cell free.
+inline std::map<CellIndex, int> oracle_votes(const RebuildJob& job) {
+  std::map<CellIndex, int> votes;
+  for (const PlacedCloud& cloud : job.clouds) {
+    if (cloud.id == job.open_cloud) continue;
+    for (const FreeCell free : cloud.cloud->free) {
+      const Eigen::Vector3d centre = cell_centre(unpack_free_cell(free), job.config.mid_cell_m);
+      ++votes[floor_cell(cloud.T_map_keyframe * centre, job.config.mid_cell_m)];
+    }
+  }
+  return votes;
+}
+
 /// The levels that the clouds of a job make, by brute force. Cell sizes must be powers of two [m].
 inline std::array<OracleLevel, kLevels> oracle_levels(const RebuildJob& job) {
   const double cells[] = {job.config.local_cell_m, job.config.mid_cell_m, job.config.coarse_cell_m};
   const double windows[] = {job.config.local_window_m, job.config.mid_window_m, job.config.coarse_window_m};
   std::array<OracleLevel, kLevels> levels;
+  std::map<CellIndex, int> votes = oracle_votes(job);
   for (const PlacedCloud& cloud : job.clouds) {
     const Eigen::Matrix3d R = cloud.T_map_keyframe.rotation.normalized().toRotationMatrix();
-    for (const CloudPoint& point : *cloud.points) {
+    for (const CloudPoint& point : cloud.cloud->points) {
       const Eigen::Vector3d p = R * point.position.cast<double>() + cloud.T_map_keyframe.translation;
+      if (votes[floor_cell(p, cells[1])] >= job.config.carve_keyframes) continue;
       for (std::size_t i = 0; i < kLevels; ++i) {
         const CellIndex cell = floor_cell(p, cells[i]);
         const Eigen::Vector3d centre = cell_centre(cell, cells[i]);

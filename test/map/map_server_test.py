@@ -14,8 +14,8 @@ import time
 import pytest
 
 from ignis.pipeline import binary
+from stream_client import PROTOCOL
 
-PROTOCOL = "ignis.lio_map.v2"
 EMPTY_FRAME_BYTES = 124
 
 

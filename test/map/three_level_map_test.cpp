@@ -24,7 +24,7 @@ struct World {
   explicit World(const MapConfig& c = {}) : config(c), map(c) {}
 
   [[nodiscard]] ThreeLevelMap::CloudLookup lookup() const {
-    return [this](std::int32_t id) { return std::span<const CloudPoint>(store.at(id)); };
+    return [this](std::int32_t id) { return StoredCloud{store.at(id), {}}; };
   }
   InsertCounts add(std::int32_t id, std::vector<CloudPoint> points, const Pose& pose) {
     store[id] = std::move(points);
@@ -38,7 +38,7 @@ struct World {
                    .coarsening = map.coarsening(),
                    .open_cloud = {}};
     for (const auto& [id, points] : store) {
-      job.clouds.push_back({id, std::make_shared<const std::vector<CloudPoint>>(points), map.pose(id)});
+      job.clouds.push_back({id, std::make_shared<const CloudData>(CloudData{points, {}}), map.pose(id)});
     }
     return job;
   }
@@ -151,8 +151,8 @@ TEST(ThreeLevelMap, ARemovedCloudMakesRoomForTheOthersPoints) {
   World world = random_world(6, 6, 3'000);
   const std::size_t before = world.map.size();
   const std::vector<std::int32_t> ids = {1, 4};
-  for (const std::int32_t id : ids) world.store.erase(id);
   world.map.remove_clouds(ids, world.lookup());
+  for (const std::int32_t id : ids) world.store.erase(id);
   EXPECT_FALSE(world.map.contains(4));
   EXPECT_LT(world.map.size(), before);
   expect_equals_oracle(world);

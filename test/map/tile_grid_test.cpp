@@ -61,9 +61,9 @@ TEST(PointLocator, PutsPointsOnBordersIntoNestedCellsWhateverTheSizes) {
         ASSERT_LT(location.cell_in_tile[k], static_cast<std::uint32_t>(n * n * n));
         EXPECT_LT(location.from_centre[k].cwiseAbs().maxCoeff(), 0.5 * grid.cell_m[k] + 1e-6);
       }
-      EXPECT_EQ(locator.parent_in_tile(0, 1, location.cell_in_tile[0]), location.cell_in_tile[1]);
-      EXPECT_EQ(locator.parent_in_tile(0, 2, location.cell_in_tile[0]), location.cell_in_tile[2]);
-      EXPECT_EQ(locator.parent_in_tile(1, 2, location.cell_in_tile[1]), location.cell_in_tile[2]);
+      EXPECT_EQ(locator.parent_in_tile(0, 1, grid.split(0, location.cell_in_tile[0])), location.cell_in_tile[1]);
+      EXPECT_EQ(locator.parent_in_tile(0, 2, grid.split(0, location.cell_in_tile[0])), location.cell_in_tile[2]);
+      EXPECT_EQ(locator.parent_in_tile(1, 2, grid.split(1, location.cell_in_tile[1])), location.cell_in_tile[2]);
     }
   }
 }
