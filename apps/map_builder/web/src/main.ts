@@ -26,7 +26,7 @@ const post = (message: ToWorker): void => worker.postMessage(message);
 const send = (message: ClientText): void => post({ kind: "send", message });
 
 const settings = new SettingsStore();
-const view = new MapView(byId<HTMLCanvasElement>("map"));
+const view = openView();
 const hud = new HudPanel();
 const status = new StatusDisplay();
 const timeline = new Timeline();
@@ -46,6 +46,17 @@ loops.onGoTo = ({ from }) => {
 };
 view.onArcPicked = (arc) => loops.choose(arc && { from: arc.fromId, to: arc.toId });
 timeline.onChosen = goTo;
+
+function openView(): MapView {
+  try {
+    return new MapView(byId<HTMLCanvasElement>("map"));
+  } catch (error) {
+    byId("banner").hidden = false;
+    byId("banner-title").textContent = "No picture";
+    byId("banner-text").textContent = "This browser offers no WebGL 2, or it is switched off";
+    throw error;
+  }
+}
 
 function goTo(position: [number, number, number]): void {
   settings.set({ follow: false });
@@ -153,19 +164,29 @@ setInterval(() => {
 
 // --- operator ---------------------------------------------------------------------------------------------------------
 
-function togglePanel(button: string, isOpen: boolean): void {
-  byId(button).setAttribute("aria-expanded", String(isOpen));
+/** On a narrow screen one panel at a time. */
+function openAlone(opened: "hud" | "controls" | "loops"): void {
+  if (!matchMedia(NARROW).matches) return;
+  if (opened !== "hud") setFigures(false);
+  if (opened !== "controls") setControls(false);
+  if (opened !== "loops") loops.setOpen(false);
 }
 
-function toggleControls(): void {
-  const panel = byId("controls");
-  panel.hidden = !panel.hidden;
-  togglePanel("toggle-controls", !panel.hidden);
+function setControls(isOpen: boolean): void {
+  byId("controls").hidden = !isOpen;
+  byId("toggle-controls").setAttribute("aria-expanded", String(isOpen));
+  if (isOpen) openAlone("controls");
 }
 
-function toggleFigures(): void {
-  togglePanel("toggle-hud", document.body.classList.toggle("with-hud"));
+function setFigures(isOpen: boolean): void {
+  document.body.classList.toggle("with-hud", isOpen);
+  byId("toggle-hud").setAttribute("aria-expanded", String(isOpen));
+  if (isOpen) openAlone("hud");
 }
+
+const toggleControls = (): void => setControls(!!byId("controls").hidden);
+const toggleFigures = (): void => setFigures(!document.body.classList.contains("with-hud"));
+loops.onOpened = () => openAlone("loops");
 
 const orbit = (yaw: number, pitch: number) => () => view.rig.turn(yaw, pitch);
 const shortcuts: Shortcut[] = [
@@ -207,7 +228,7 @@ byId("theme").addEventListener("click", switchTheme);
 byId("open-help").addEventListener("click", toggleHelp);
 byId("toggle-controls").addEventListener("click", toggleControls);
 byId("toggle-hud").addEventListener("click", toggleFigures);
-if (matchMedia(NARROW).matches) toggleControls();
+if (matchMedia(NARROW).matches) setControls(false);
 document.addEventListener("visibilitychange", () => {
   if (!document.hidden) post({ kind: "retry" });
 });

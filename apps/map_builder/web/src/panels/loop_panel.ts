@@ -22,6 +22,7 @@ export class LoopPanel {
   /** The chosen loop, or null; the caller draws it. */
   onChosen: (loop: Loop | null) => void = () => {};
   onGoTo: (loop: Loop) => void = () => {};
+  onOpened: () => void = () => {};
   private loops: Loop[] = [];
   private chosen: { from: number; to: number } | null = null;
   private readonly panel = byId("loops");
@@ -46,7 +47,8 @@ export class LoopPanel {
   setOpen(isOpen: boolean): void {
     this.panel.hidden = !isOpen;
     byId("show-loops").setAttribute("aria-expanded", String(isOpen));
-    if (!isOpen) this.choose(null);
+    if (isOpen) this.onOpened();
+    else if (this.chosen) this.choose(null);
   }
 
   set(loops: Loop[]): void {

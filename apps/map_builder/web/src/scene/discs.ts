@@ -23,7 +23,7 @@ void main() {
   float radius = length(2.0 * gl_PointCoord - 1.0), pixel = 2.0 / u_size;
   float cover = 1.0 - smoothstep(1.0 - 1.5 * pixel, 1.0, radius);
   if (cover <= 0.0) discard;
-  float core = 1.0 - smoothstep(1.0 - 4.0 * pixel, 1.0 - 2.5 * pixel, radius);
+  float core = 1.0 - smoothstep(1.0 - 2.6 * pixel, 1.0 - 1.4 * pixel, radius);
   colour = vec4(mix(u_rim, v_colour, core), cover * u_opacity);
 }`;
 

@@ -51,6 +51,7 @@ export class MapView {
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
     this.watchPicks();
+    canvas.addEventListener("webglcontextrestored", () => this.redraw());
     requestAnimationFrame((now) => this.frame(now));
   }
 
@@ -92,6 +93,7 @@ export class MapView {
     uniforms.u_cut.value = Math.min(ceiling, 1e9);
     [uniforms.u_low.value] = this.heights;
     uniforms.u_high.value = Math.min(this.heights[1], ceiling);
+    uniforms.u_veil.value = this.clouds.group.visible ? 1 : 0;
     uniforms.u_centre.value.copy(vehicle.position);
     const reach = rig.viewRadius();
     uniforms.u_fade_from.value = 0.75 * reach;
@@ -189,7 +191,7 @@ export class MapView {
     this.renderer.setClearColor(colours.background);
     this.uniforms.u_background.value.set(...background);
     this.uniforms.u_edge.value = colours.edge;
-    this.uniforms.u_light.value = colours.light;
+    this.uniforms.u_lift.value = colours.lift;
     this.smoothedPath.setColour(colours.smoothed);
     this.eskfPath.setColour(colours.eskf);
     this.keyframes.setColour(rgb(colours.keyframe), background);

@@ -35,19 +35,19 @@ export interface SceneColours {
   vehicle: number;
   cloudFrom: number;
   cloudTo: number;
-  /** Strength of the darkened edges of voxels, and of the light on them. */
+  /** Strength of the darkened edges of voxels; how far their colours go towards white. */
   edge: number;
-  light: number;
+  lift: number;
 }
 
 export const SCENE_COLOURS: Record<Theme, SceneColours> = {
   dark: {
     background: 0x0c1118, smoothed: 0x58f0a0, eskf: 0xff9b52, keyframe: 0xd8fbe8, band: 0x8fb4d8, vehicle: 0xffffff,
-    cloudFrom: 0xff5fd2, cloudTo: 0x53e3ff, edge: 0.3, light: 1.0,
+    cloudFrom: 0xff5fd2, cloudTo: 0x53e3ff, edge: 0.3, lift: 0,
   },
   light: {
     background: 0xe9edf2, smoothed: 0x00864b, eskf: 0xd45500, keyframe: 0x004d2c, band: 0x51657a, vehicle: 0x10161f,
-    cloudFrom: 0xc4008f, cloudTo: 0x0070c9, edge: 0.34, light: 0.92,
+    cloudFrom: 0xc4008f, cloudTo: 0x0070c9, edge: 0.26, lift: 0.22,
   },
 };
 

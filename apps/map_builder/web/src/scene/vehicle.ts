@@ -10,6 +10,7 @@ import type { PerLevel } from "../stream/protocol";
 const CORNERS: [number, number][] = [[0, 0.95], [0.55, -0.6], [0, -0.28], [-0.55, -0.6]];
 const RING_STEPS = 128;
 const EASE_S = 0.09;
+const FARTHEST_GLIDE_M = 5;
 
 function arrow(): ExtrudeGeometry {
   const shape = new Shape();
@@ -62,13 +63,7 @@ export class VehicleGlyph {
   moveTo(position: number[], [w, x, y, z]: number[]): void {
     this.targetPosition.set(position[0], position[1], position[2]);
     this.targetRotation.set(x, y, z, w);
-    if (!this.isPlaced) this.jump();
-    this.isPlaced = this.group.visible = true;
-  }
-
-  private jump(): void {
-    this.body.position.copy(this.targetPosition);
-    this.body.quaternion.copy(this.targetRotation);
+    this.group.visible = true;
   }
 
   get position(): Vector3 {
@@ -79,8 +74,9 @@ export class VehicleGlyph {
   advance(seconds: number): boolean {
     const gap = this.body.position.distanceTo(this.targetPosition);
     const turn = this.body.quaternion.angleTo(this.targetRotation);
-    if (gap < 1e-4 && turn < 1e-4) return false;
-    const share = gap > 5 ? 1 : 1 - Math.exp(-seconds / EASE_S);
+    if (this.isPlaced && gap < 1e-4 && turn < 1e-4) return false;
+    const share = this.isPlaced && gap < FARTHEST_GLIDE_M ? 1 - Math.exp(-seconds / EASE_S) : 1;
+    this.isPlaced = this.group.visible;
     this.body.position.lerp(this.targetPosition, share);
     this.body.quaternion.slerp(this.targetRotation, share);
     this.rings.position.copy(this.body.position);

@@ -23,7 +23,7 @@ uniform float u_cut;          // nothing above this height is drawn [m]
 uniform uint u_tick;
 uniform vec3 u_centre;        // the vehicle
 uniform float u_fade_from, u_fade_to;
-uniform float u_light;
+uniform float u_lift;         // towards white, where the background is bright
 out vec3 v_colour;
 out vec2 v_face;
 out float v_fade;
@@ -53,7 +53,7 @@ void main() {
       : log2(1.0 + 0.1 * float((u_tick - a_voxel.y) & 0xffffffu)) / log2(601.0);
   vec3 colour = u_mode == 2 ? u_level_colour : ramp(t);
   float shade = axis == 1 ? (side > 0.0 ? 1.0 : 0.5) : axis == 0 ? 0.80 : 0.66;
-  v_colour = colour * shade * u_level_light * u_light;
+  v_colour = mix(colour, vec3(1.0), u_lift) * shade * u_level_light;
   v_face = vec2(u, v);
   v_fade = smoothstep(u_fade_from, u_fade_to, distance(world.xz, u_centre.xz));
   v_pixels = u_cell * u_pixels_per_radian / max(distance(eye, centre), 0.01);
@@ -69,13 +69,14 @@ in float v_fade;
 in float v_pixels;
 uniform vec3 u_background;
 uniform float u_edge;
+uniform float u_veil;         // 1: only a hint of the voxels is left
 out vec4 colour;
 void main() {
   // Darker towards the face's border: neighbours stay apart where they are large enough to be seen.
   vec2 inside = 0.5 * v_pixels * (1.0 - abs(v_face));
   float border = 1.0 - smoothstep(0.4, 1.6, min(inside.x, inside.y));
   vec3 lit = v_colour * (1.0 - u_edge * border * smoothstep(3.0, 9.0, v_pixels));
-  colour = vec4(mix(lit, u_background, 0.75 * v_fade), 1.0);
+  colour = vec4(mix(lit, u_background, max(0.75 * v_fade, 0.82 * u_veil)), 1.0);
 }`;
 
 export type Uniforms = Record<string, IUniform>;
@@ -94,7 +95,8 @@ export function sharedUniforms(): Uniforms {
     u_fade_to: { value: 2e6 },
     u_background: { value: new Vector3() },
     u_edge: { value: 0.3 },
-    u_light: { value: 1 },
+    u_lift: { value: 0 },
+    u_veil: { value: 0 },
     u_pixels_per_radian: { value: 1000 },
   };
 }

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A browser in a network of its own."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from view_page import ARGUMENTS, CHROMIUM
+
+
+@pytest.fixture(scope="module")
+def browser(private_network) -> Iterator[Browser]:
+    """Headless Chromium; started after the network was made, so that it sees no other."""
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
