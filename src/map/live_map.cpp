@@ -45,7 +45,8 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   return true;
 }
 
-void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses) {
+void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision) {
+  revision_ = revision;
   if (usable(T_map_odom)) {
     T_map_odom_ = T_map_odom;
   } else {
@@ -126,16 +127,32 @@ std::vector<Eigen::Vector3f> LiveMap::corrected_path() const {
   });
 }
 
-std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> LiveMap::loop_edges() const {
-  std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> edges;
+std::vector<LoopEdge> LiveMap::loop_edges() const {
+  std::vector<LoopEdge> edges;
   for (const auto& [from_id, to_id] : loops_) {
     const auto from = nodes_.find(from_id);
     const auto to = nodes_.find(to_id);
     if (from == nodes_.end() || to == nodes_.end()) continue;
-    edges.emplace_back(from->second.T_map_keyframe.translation.cast<float>(),
-                       to->second.T_map_keyframe.translation.cast<float>());
+    edges.push_back({from->second.T_map_keyframe.translation.cast<float>(),
+                     to->second.T_map_keyframe.translation.cast<float>(), from_id, to_id});
   }
   return edges;
+}
+
+std::vector<std::pair<std::int32_t, Eigen::Vector3f>> LiveMap::keyframe_positions() const {
+  std::vector<std::pair<std::int32_t, Eigen::Vector3f>> positions;
+  for (const auto& [id, node] : nodes_) positions.emplace_back(id, node.T_map_keyframe.translation.cast<float>());
+  return positions;
+}
+
+std::vector<Eigen::Vector3f> LiveMap::placed_cloud(std::int32_t id) const {
+  std::vector<Eigen::Vector3f> points;
+  const auto node = nodes_.find(id);
+  if (node == nodes_.end()) return points;
+  for (const CloudPoint& point : *clouds_.cloud(id)) {
+    points.emplace_back((node->second.T_map_keyframe * Eigen::Vector3d(point.position.cast<double>())).cast<float>());
+  }
+  return points;
 }
 
 std::vector<std::int32_t> LiveMap::missing_keyframes(std::int32_t count) const {

@@ -49,7 +49,7 @@ class LiveMap {
 
   /// The back end's newest state: poses that moved and the correction of odom. Poses that no map can hold are ignored
   /// and counted.
-  void correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses);
+  void correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision = 0);
 
   /// A loop factor entered or left the graph. One that entered makes the next correction rebuild the map.
   void add_loop(std::int32_t from_id, std::int32_t to_id);
@@ -67,14 +67,19 @@ class LiveMap {
 
   [[nodiscard]] const ThreeLevelMap& voxels() const { return map_; }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_; }
+  [[nodiscard]] const Pose& T_map_odom() const { return T_map_odom_; }
+  [[nodiscard]] std::int32_t revision() const { return revision_; }  ///< that the voxels stand on
   [[nodiscard]] Pose T_map_body() const { return T_map_odom_ * T_odom_body_; }
   [[nodiscard]] int rebuilds() const { return rebuilds_; }
   [[nodiscard]] std::int64_t refused_poses() const { return refused_poses_; }
 
   [[nodiscard]] std::vector<Eigen::Vector3f> odometry_path() const { return path_.odometry(); }
   [[nodiscard]] std::vector<Eigen::Vector3f> corrected_path() const;
-  /// Both ends of every loop [m, map].
-  [[nodiscard]] std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> loop_edges() const;
+  [[nodiscard]] std::vector<LoopEdge> loop_edges() const;
+  /// Where the keyframes stand [m, map], ascending ids.
+  [[nodiscard]] std::vector<std::pair<std::int32_t, Eigen::Vector3f>> keyframe_positions() const;
+  /// The cloud of a keyframe at its corrected pose [m, map]; empty when it is not in store.
+  [[nodiscard]] std::vector<Eigen::Vector3f> placed_cloud(std::int32_t id) const;
 
   /// Keyframe ids below `count` whose cloud never arrived.
   [[nodiscard]] std::vector<std::int32_t> missing_keyframes(std::int32_t count) const;
@@ -107,6 +112,7 @@ class LiveMap {
   bool corrected_since_loop_ = false;
   bool rebuilding_ = false;
   std::vector<WaitingScan> waiting_;  // arrived while a rebuild was running
+  std::int32_t revision_ = 0;
   int rebuilds_ = 0;
   std::int64_t refused_poses_ = 0;
 };

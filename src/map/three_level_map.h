@@ -10,11 +10,10 @@
 #include "common/measurements.h"
 #include "common/pose.h"
 #include "map/map_config.h"
+#include "map/map_picture.h"
 #include "map/voxel_level.h"
 
 namespace ignis {
-
-inline constexpr std::size_t kLevels = 3;  ///< fine to coarse: local, mid, coarse
 
 /// A cloud and where it belongs. The points are shared: a rebuild reads them on another thread while nobody writes.
 struct PlacedCloud {

@@ -12,16 +12,7 @@ constexpr int kBits = 21;
 constexpr std::int32_t kBias = 1 << (kBits - 1);
 constexpr std::uint64_t kMask = (1ULL << kBits) - 1;
 
-std::int32_t floor_divide(std::int32_t value, std::int32_t divisor) {
-  const std::int32_t quotient = value / divisor;
-  return value % divisor < 0 ? quotient - 1 : quotient;
-}
-
 }  // namespace
-
-CellIndex parent_cell(const CellIndex& cell, int ratio) {
-  return {floor_divide(cell.x, ratio), floor_divide(cell.y, ratio), floor_divide(cell.z, ratio)};
-}
 
 VoxelLevel::Key VoxelLevel::pack(const CellIndex& cell) {
   const auto axis = [](std::int32_t index) { return static_cast<Key>(index + kBias) & kMask; };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -11,18 +10,9 @@
 #include <Eigen/Core>
 #include <boost/unordered/unordered_flat_map.hpp>
 
+#include "map/cell_index.h"
+
 namespace ignis {
-
-/// Index of a cubic cell: cell i spans [i, i + 1) * cell size on each axis of the world.
-struct CellIndex {
-  std::int32_t x = 0;
-  std::int32_t y = 0;
-  std::int32_t z = 0;
-  auto operator<=>(const CellIndex&) const = default;
-};
-
-/// The cell of a grid `ratio` times coarser that contains `cell` (rounds down, also below zero).
-[[nodiscard]] CellIndex parent_cell(const CellIndex& cell, int ratio);
 
 /// A map point that did not come from a keyframe but from a live scan.
 inline constexpr std::int32_t kLive = -1;

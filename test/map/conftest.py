@@ -14,7 +14,7 @@ import pytest
 
 from ignis.pipeline import binary
 
-PROTOCOL = "ignis.lio_map.v1"
+PROTOCOL = "ignis.lio_map.v2"
 
 
 class Server:
