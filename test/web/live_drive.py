@@ -18,6 +18,7 @@ CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
 SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
 PORT = 18090
+SCREENSHOT_SECONDS = 6.0  # software rendering takes a second for each
 FIGURES = ("hud-yaw", "hud-pitch", "hud-roll", "hud-right", "hud-up", "hud-forward", "hud-scan", "hud-keyframes")
 
 
@@ -36,12 +37,13 @@ class LiveDrive:
         self.statuses: list[dict[str, Any]] = []
         self.vehicle: list[list[float]] = []
         self.alarms: list[str] = []
+        self.next_status = self.next_screenshot = 0.0
         self.before_loop = folder / "before_loop.png"
         self.after_loop = folder / "after_loop.png"
 
     def start_map_builder(self) -> None:
         self.pipeline.start("map_builder", "--config", CONFIG, "--port", PORT)
-        self.pipeline.wait_for_text("map_builder", "http://", 10.0)
+        self.pipeline.wait_for_text("map_builder", "http://", 20.0)
 
     def stop_map_builder(self) -> None:
         self.pipeline.stop("map_builder")
@@ -67,7 +69,8 @@ class LiveDrive:
             if alarm_at and time.monotonic() > alarm_at:
                 self.raise_alarm()
                 alarm_at = None
-            self.view.page.wait_for_timeout(500)
+            self.view.page.wait_for_timeout(200)
+        self.pipeline.processes.pop("l1_sim")
         assert simulator.returncode == 0, self.pipeline.last_words("l1_sim")
         self.look()
 
@@ -83,12 +86,15 @@ class LiveDrive:
         self.figures.append((hud, texts))
         self.applied.update({entry["sequence"]: entry for entry in applied})
         self.vehicle.append(vehicle)
-        self.statuses.append(self.view.status())
-        in_graph = [loop for loop in loops if loop["stage"] in ("on_trial", "kept")]
-        if not in_graph:
-            self.view.screenshot(self.before_loop)
-        elif not self.after_loop.exists():
+        if not self.statuses or time.monotonic() > self.next_status:
+            self.statuses.append(self.view.status())
+            self.next_status = time.monotonic() + 1.0
+        has_loop = any(loop["stage"] in ("on_trial", "kept") for loop in loops)
+        if has_loop and not self.after_loop.exists():
             self.view.screenshot(self.after_loop)
+        elif not has_loop and time.monotonic() > self.next_screenshot:
+            self.view.screenshot(self.before_loop)
+            self.next_screenshot = time.monotonic() + SCREENSHOT_SECONDS
 
     def raise_alarm(self) -> None:
         """Says on the bus that the front end is lost, as it would; its own next word takes that back."""

@@ -59,7 +59,7 @@ def test_figures_equal_the_published_pose(drive: LiveDrive) -> None:
         for name in ("right", "up", "forward"):
             assert state[f"{name}_mps"] == pytest.approx(getattr(published, f"velocity_{name}"), abs=1e-9)
             assert texts[f"hud-{name}"] == shown(state[f"{name}_mps"], 2)
-    assert compared > 50
+    assert compared > 50, (len(drive.figures), len(drive.listener.states))
 
 
 def test_position_equals_the_smoothed_state(drive: LiveDrive) -> None:
@@ -75,12 +75,12 @@ def test_position_equals_the_smoothed_state(drive: LiveDrive) -> None:
 
 
 def test_vehicle_stands_where_the_pose_says(drive: LiveDrive) -> None:
-    gaps = [
-        np.linalg.norm(np.subtract(hud["state"]["position"], vehicle))
-        for (hud, _), vehicle in zip(drive.figures, drive.vehicle, strict=True)
-        if hud["state"]
-    ]
-    assert np.median(gaps) < 0.3  # it glides
+    def stands() -> bool:
+        hud, vehicle = drive.view.hook("hud", "vehicle")
+        return np.allclose(hud["state"]["position"], vehicle, atol=1e-3)
+
+    drive.view.wait(10, "the vehicle at its pose", stands)
+    assert np.ptp(np.array(drive.vehicle)[:, [0, 2]], axis=0).min() > 5.0
 
 
 def test_loop_is_seen_on_two_screenshots(drive: LiveDrive) -> None:
@@ -140,7 +140,7 @@ def test_pinch_zooms(drive: LiveDrive) -> None:
 
     def touch(kind: str, half: float) -> None:
         points = (
-            [] if kind == "touchEnd" else [{"x": 640 - half, "y": 400, "id": 0}, {"x": 640 + half, "y": 400, "id": 1}]
+            [] if kind == "touchEnd" else [{"x": 480 - half, "y": 400, "id": 0}, {"x": 480 + half, "y": 400, "id": 1}]
         )
         session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
@@ -192,7 +192,7 @@ def test_an_event_leads_back_to_where_it_happened(drive: LiveDrive) -> None:
 
 def test_keys_themes_and_help(drive: LiveDrive) -> None:
     view = drive.view
-    view.page.locator("body").click(position={"x": 640, "y": 300})
+    view.page.locator("body").click(position={"x": 480, "y": 330})
     view.page.keyboard.press("?")
     assert view.page.get_by_test_id("help").is_visible()
     view.page.keyboard.press("Escape")

@@ -21,12 +21,13 @@ ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--ena
 class ViewPage:
     """One tab with the view. Keeps console errors, page errors and the hosts of all requests."""
 
-    def __init__(self, browser: Browser, address: str, width: int = 1280, height: int = 800, **options: Any) -> None:
+    def __init__(self, browser: Browser, address: str, width: int = 960, height: int = 600, **options: Any) -> None:
         self.address = address
         self.errors: list[str] = []
         self.hosts: set[str] = set()
         self.context = browser.new_context(
-            viewport={"width": width, "height": height}, **{"color_scheme": "dark", **options}
+            viewport={"width": width, "height": height},
+            **{"color_scheme": "dark", "reduced_motion": "reduce", **options},
         )
         self.page: Page = self.context.new_page()
         self.page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
@@ -53,9 +54,13 @@ class ViewPage:
         """The first true value of `holds`. The page's own waiting functions need eval, which its policy forbids."""
         deadline = time.monotonic() + seconds
         while not (value := holds()):
-            assert time.monotonic() < deadline, f"not within {seconds:.0f} s: {what}; console: {self.errors}"
+            assert time.monotonic() < deadline, f"not within {seconds:.0f} s: {what}; {self.describe()}"
             self.page.wait_for_timeout(100)
         return value
+
+    def describe(self) -> str:
+        fields = ("connected", "connections", "sequence", "counts", "snapshots", "errors", "drawn", "servedRadius")
+        return f"{dict(zip(fields, self.hook(*fields), strict=True))}; console: {self.errors}"
 
     def wait_for_map(self, seconds: float = 20.0) -> None:
         self.wait(seconds, "a map on the screen", lambda: self.hook("sequence") > 0 and sum(self.hook("counts")) > 0)

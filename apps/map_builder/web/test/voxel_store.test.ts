@@ -4,6 +4,7 @@ import { Checksum } from "../src/stream/checksum";
 import { decodeFrame } from "../src/stream/frame";
 import type { Vector3 } from "../src/stream/protocol";
 import { CHUNK_BITS, VoxelStore, type ChunkUpdate } from "../src/stream/voxel_store";
+import wireFormat from "../../../../docs/wire_format.md?raw";
 import { checksumOf, encode, random, type TestVoxel } from "./frames";
 
 const name = ({ level, cell }: TestVoxel): string => `${level}:${cell}`;
@@ -47,6 +48,23 @@ describe("Checksum", () => {
       sum.add(voxel.level, ...voxel.cell, voxel.intensity, voxel.flags);
       expect(sum.hex()).toBe(checksumOf([voxel]));
     }
+  });
+
+  it("meets the test vector of docs/wire_format.md", () => {
+    const rows = wireFormat
+      .matchAll(/^\| (\d) \| (-?\d+) \| (-?\d+) \| (-?\d+) \| (\d+) \| (\d) \| `([0-9a-f]{16})` \|$/gm);
+    const all = new Checksum();
+    let count = 0;
+    for (const [, level, x, y, z, intensity, live, expected] of rows) {
+      const values = [level, x, y, z, intensity, live].map(Number) as [number, number, number, number, number, number];
+      const one = new Checksum();
+      one.add(...values);
+      all.add(...values);
+      expect(one.hex()).toBe(expected);
+      count++;
+    }
+    expect(count).toBeGreaterThanOrEqual(4);
+    expect(all.hex()).toBe("38b8e44257b1cb8e");
   });
 
   it("forgets what is removed", () => {

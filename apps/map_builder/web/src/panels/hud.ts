@@ -30,7 +30,8 @@ export class HudPanel {
     }
     if (hud.loop) {
       const { accepted, reason, correction_m, total_accepted, total_withdrawn } = hud.loop;
-      this.set("hud-loop", accepted ? `closed, ${number(correction_m, 2)} m` : reason || "searching", accepted ? "good" : "");
+      this.set("hud-loop", accepted ? `closed, ${number(correction_m, 2)} m` : "searching", accepted ? "good" : "");
+      this.set("hud-loop-reason", accepted ? "" : reason);
       this.set("hud-loops", count(total_accepted) + (total_withdrawn ? `, withdrawn ${count(total_withdrawn)}` : ""));
     }
     this.set("hud-keyframes", count(hud.map.keyframes));

@@ -74,6 +74,9 @@ export class Timeline {
 
   add(event: MapEvent): void {
     this.events.push(event);
+    // What happened before the first measurement has no time of its own.
+    const first = this.events.find(({ utime }) => utime > 0)?.utime ?? 0;
+    for (const each of this.events) each.utime = Math.max(each.utime, first);
     if (this.events.length > KEPT_EVENTS) this.events.shift();
     this.isDrawn = false;
   }

@@ -44,7 +44,8 @@ export class MapView {
   private lastFrame = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    // Dense screens show no stairs.
+    this.renderer = new WebGLRenderer({ canvas, antialias: devicePixelRatio < 2, powerPreference: "high-performance" });
     this.rig = new CameraRig(canvas);
     this.scene.add(this.voxels.group, this.eskfPath.group, this.smoothedPath.group, this.keyframes.discs.points,
       this.arcs.group, this.clouds.group, this.vehicle.group);

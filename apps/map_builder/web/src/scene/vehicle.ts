@@ -28,6 +28,7 @@ export class VehicleGlyph {
   private readonly ringMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
   private readonly targetPosition = new Vector3();
   private readonly targetRotation = new Quaternion();
+  private readonly glides = !matchMedia("(prefers-reduced-motion: reduce)").matches;
   private isPlaced = false;
 
   constructor() {
@@ -75,7 +76,7 @@ export class VehicleGlyph {
     const gap = this.body.position.distanceTo(this.targetPosition);
     const turn = this.body.quaternion.angleTo(this.targetRotation);
     if (this.isPlaced && gap < 1e-4 && turn < 1e-4) return false;
-    const share = this.isPlaced && gap < FARTHEST_GLIDE_M ? 1 - Math.exp(-seconds / EASE_S) : 1;
+    const share = this.isPlaced && this.glides && gap < FARTHEST_GLIDE_M ? 1 - Math.exp(-seconds / EASE_S) : 1;
     this.isPlaced = this.group.visible;
     this.body.position.lerp(this.targetPosition, share);
     this.body.quaternion.slerp(this.targetRotation, share);

@@ -7,7 +7,7 @@ import {
 import { Checksum } from "../stream/checksum";
 import type { PerLevel } from "../stream/protocol";
 import { CHUNK_BITS, type ChunkUpdate } from "../stream/voxel_store";
-import { type Uniforms, VERTICES_PER_VOXEL, voxelMaterial } from "./voxel_material";
+import { FACE_INDICES, type Uniforms, voxelMaterial } from "./voxel_material";
 
 type VoxelMesh = Mesh<InstancedBufferGeometry, ShaderMaterial>;
 interface DrawnChunk {
@@ -53,7 +53,7 @@ export class VoxelChunks {
     attribute.setUsage(DynamicDrawUsage);
     const geometry = new InstancedBufferGeometry();
     geometry.setAttribute("a_voxel", attribute);
-    geometry.setDrawRange(0, VERTICES_PER_VOXEL);
+    geometry.setIndex(FACE_INDICES);
     const edge = (1 << CHUNK_BITS[update.level]) * update.cell;
     // By hand: the geometry has no positions from which three.js could take it.
     geometry.boundingSphere = new Sphere(new Vector3(edge, edge, edge).multiplyScalar(0.5), (Math.sqrt(3) / 2) * edge);

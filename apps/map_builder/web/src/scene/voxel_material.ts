@@ -5,7 +5,8 @@ import { GLSL3, ShaderMaterial, Vector3, type IUniform } from "three";
 import type { ColourMode } from "../settings";
 import { AGE_RAMP, HEIGHT_RAMP, INTENSITY_RAMP, LEVEL_COLOURS, RAMP_STEPS } from "./palette";
 
-export const VERTICES_PER_VOXEL = 18;
+/** Three faces of four corners each. */
+export const FACE_INDICES = [0, 4, 8].flatMap((first) => [0, 1, 2, 0, 2, 3].map((corner) => first + corner));
 const MODES: Record<ColourMode, number> = { height: 0, intensity: 1, level: 2, age: 3 };
 const RAMPS: Record<ColourMode, [number, number, number][]> = {
   height: HEIGHT_RAMP, intensity: INTENSITY_RAMP, level: HEIGHT_RAMP, age: AGE_RAMP,
@@ -38,15 +39,15 @@ vec3 ramp(float t) {
 
 void main() {
   vec3 cell = vec3(a_voxel.x & 255u, (a_voxel.x >> 8) & 255u, (a_voxel.x >> 16) & 255u);
-  vec3 corner = modelMatrix[3].xyz;
+  vec3 origin = modelMatrix[3].xyz;
   vec3 centre = (cell + 0.5) * u_cell;
-  vec3 eye = cameraPosition - corner;
-  int axis = gl_VertexID / 6, index = gl_VertexID % 6;
-  float u = (index == 1 || index == 2 || index == 4) ? 1.0 : -1.0;
-  float v = (index == 2 || index == 4 || index == 5) ? 1.0 : -1.0;
+  vec3 eye = cameraPosition - origin;
+  int axis = gl_VertexID / 4, corner = gl_VertexID % 4;
+  float u = (corner == 1 || corner == 2) ? 1.0 : -1.0;
+  float v = corner >= 2 ? 1.0 : -1.0;
   float side = eye[axis] > centre[axis] ? 1.0 : -1.0;
   vec3 offset = axis == 0 ? vec3(side, u, v) : axis == 1 ? vec3(u, side, v) : vec3(u, v, side);
-  vec3 world = corner + centre;
+  vec3 world = origin + centre;
 
   float t = u_mode == 0 ? (world.y - u_low) / max(u_high - u_low, 0.1)
       : u_mode == 1 ? float(a_voxel.x >> 24) / 255.0
