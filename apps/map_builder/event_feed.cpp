@@ -50,12 +50,10 @@ void EventFeed::process(Utime utime, const ProcessTable::Change& change) {
   const bool ok = change.now == "ok";
   if (change.before.empty() && ok) return;  // it has just started
   const bool is_front_end = change.process == "lio_frontend";
-  const char* kind = is_front_end && change.now == "lost" ? "lost"
+  const char* kind = is_front_end && change.now == "lost"                                ? "lost"
                      : is_front_end && change.before == "lost" && change.now != "silent" ? "found"
-                                                                                          : "health";
-  const EventLevel level = ok                         ? EventLevel::kInfo
-                           : change.now == "degraded" ? EventLevel::kWarn
-                                                      : EventLevel::kError;
+                                                                                         : "health";
+  const EventLevel level = ok ? EventLevel::kInfo : change.now == "degraded" ? EventLevel::kWarn : EventLevel::kError;
   add(utime, kind, std::format("{} is {}: {}", change.process, change.now, change.reason), level);
 }
 

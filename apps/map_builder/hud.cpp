@@ -85,10 +85,8 @@ Json link_json(const HudData& data) {
 }
 
 Json duration_json(const DurationStats& stats) {
-  return {{"count", stats.count()},
-          {"median", stats.quantile(0.5)},
-          {"p99", stats.quantile(0.99)},
-          {"max", stats.max()}};
+  return {
+      {"count", stats.count()}, {"median", stats.quantile(0.5)}, {"p99", stats.quantile(0.99)}, {"max", stats.max()}};
 }
 
 Json budget_json(const MapBudget& budget) {

@@ -30,12 +30,13 @@ LoopClouds encode_loop_clouds(const LoopCloudsRequest& loop, std::span<const Eig
                               std::span<const Eigen::Vector3f> to) {
   const std::uint32_t counts[] = {count_of(from), count_of(to)};
   LoopClouds clouds;
-  clouds.text = nlohmann::ordered_json{{"type", "loop_clouds"},
-                                       {"from", loop.from_id},
-                                       {"to", loop.to_id},
-                                       {"from_points", counts[0]},
-                                       {"to_points", counts[1]}}
-                    .dump();
+  clouds.text = nlohmann::ordered_json{
+      {"type", "loop_clouds"},
+      {"from", loop.from_id},
+      {"to", loop.to_id},
+      {"from_points", counts[0]},
+      {"to_points",
+       counts[1]}}.dump();
   clouds.bytes.append(reinterpret_cast<const char*>(counts), sizeof counts);
   append(from, clouds.bytes);
   append(to, clouds.bytes);

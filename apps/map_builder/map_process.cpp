@@ -9,7 +9,6 @@
 
 #include "ignis/graph_command_t.hpp"
 #include "ignis/keyframe_request_t.hpp"
-#include "map/picture_builder.h"
 #include "map_builder/loop_clouds.h"
 #include "runtime/channels.h"
 #include "runtime/stop_signal.h"
@@ -269,8 +268,8 @@ void MapProcess::refresh_paths() {
   corrected_path_ = std::make_shared<const std::vector<Eigen::Vector3f>>(map_.corrected_path());
   const double bytes = 2.0 * kPathPointBytes * static_cast<double>(odometry_path_->size());
   const auto period = std::chrono::duration<double>(bytes / kPathBytesPerSecond);
-  next_paths_ = Clock::now() + std::max<Clock::duration>(std::chrono::duration_cast<Clock::duration>(period),
-                                                         kMinPathPeriod);
+  next_paths_ =
+      Clock::now() + std::max<Clock::duration>(std::chrono::duration_cast<Clock::duration>(period), kMinPathPeriod);
 }
 
 void MapProcess::make_pictures() {
@@ -283,8 +282,9 @@ void MapProcess::make_pictures() {
     refresh_paths();
     pictures_ = timed(budget_.picture, [&] {
       std::map<double, SharedPicture> pictures;
+      std::erase_if(builders_, [&](const auto& entry) { return !radii.contains(entry.first); });
       for (const double radius : radii) {
-        MapPicture picture = picture_of(map_.voxels(), tile_grid(map_config_), radius);
+        MapPicture picture = builders_.try_emplace(radius, radius).first->second.build(map_.voxels());
         picture.number = picture_number_;
         picture.utime = hud_.map.utime;
         picture.revision = map_.revision();
@@ -316,9 +316,9 @@ void MapProcess::publish_news(ViewUpdate update) {
 
 void MapProcess::update_status() {
   const ThreeLevelMap& voxels = map_.voxels();
-  hud_.map.voxels_local = static_cast<std::int32_t>(voxels.level(0).size());
-  hud_.map.voxels_mid = static_cast<std::int32_t>(voxels.level(1).size());
-  hud_.map.voxels_coarse = static_cast<std::int32_t>(voxels.level(2).size());
+  hud_.map.voxels_local = static_cast<std::int32_t>(voxels.size(0));
+  hud_.map.voxels_mid = static_cast<std::int32_t>(voxels.size(1));
+  hud_.map.voxels_coarse = static_cast<std::int32_t>(voxels.size(2));
   budget_.voxel_bytes = voxels.bytes();
   budget_.cloud_bytes = map_.clouds().bytes();
   hud_.map.bytes = static_cast<std::int64_t>(budget_.voxel_bytes + budget_.cloud_bytes);
@@ -353,9 +353,9 @@ void MapProcess::report() {
   update_status();
   std::int8_t state = health_t::OK;
   hud_.health = "OK";
-  if (map_.voxels().coarsened() > 0) {
+  if (map_.voxels().coarsening() > 0) {
     state = health_t::DEGRADED;
-    hud_.health = "DEGRADED: map.max_voxels is reached, the finest level was coarsened";
+    hud_.health = "DEGRADED: map.max_voxels is reached, the finest level is left out";
   } else if (refused_clouds_ + map_.refused_poses() > 0) {
     state = health_t::DEGRADED;
     hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, map_.refused_poses());

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "map/live_map.h"
+#include "map/picture_builder.h"
 #include "map_builder/event_feed.h"
 #include "map_builder/hud.h"
 #include "map_builder/loop_table.h"
@@ -81,6 +82,7 @@ class MapProcess {
   SharedPath corrected_path_;
   SharedLoopEdges loop_edges_;
   Clock::time_point next_paths_{};
+  std::map<double, PictureBuilder> builders_;  // by view radius [m], as are the pictures
   std::map<double, SharedPicture> pictures_;
   std::int64_t picture_number_ = 0;
   std::int64_t refused_clouds_ = 0;

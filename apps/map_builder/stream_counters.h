@@ -23,7 +23,7 @@ struct StreamCounters {
   std::atomic<std::int64_t> oversized = 0;        ///< (1009)
   std::atomic<std::int64_t> idle_closes = 0;      ///< nothing moved on the connection
   std::atomic<std::int64_t> refused_upgrades = 0;
-  std::atomic<std::int64_t> refused_http = 0;     ///< answered 4xx or 5xx
+  std::atomic<std::int64_t> refused_http = 0;  ///< answered 4xx or 5xx
 };
 
 }  // namespace ignis

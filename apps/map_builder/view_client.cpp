@@ -121,8 +121,7 @@ void ViewClient::handle(const std::string& text) {
     answer({shared(error_text("bad_request", request.error())), nullptr});
   } else if (const auto* view = std::get_if<ViewRequest>(&*request)) {
     answer({shared(nlohmann::json{{"type", "view"}, {"radius", view->radius_m}}.dump()), nullptr});
-    const double served =
-        std::min(context_.max_view_radius_m, kRadiusStep * std::ceil(view->radius_m / kRadiusStep));
+    const double served = std::min(context_.max_view_radius_m, kRadiusStep * std::ceil(view->radius_m / kRadiusStep));
     if (std::exchange(view_radius_, served) != served) context_.on_view_changed();
   } else if (std::holds_alternative<ResyncRequest>(*request)) {
     ++context_.counters.resyncs;

@@ -35,7 +35,7 @@ constexpr std::chrono::seconds kIdleTimeout{10};
 constexpr std::chrono::milliseconds kAcceptPause{100};
 constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
 constexpr std::size_t kMaxInboundBytes = 64 * 1024;
-constexpr int kSpareConnections = 16;  // beside the viewers: pages and status requests
+constexpr int kSpareConnections = 16;    // beside the viewers: pages and status requests
 constexpr int kSendBuffer = 256 * 1024;  // [bytes] per viewer in the kernel: more would only hold what is no longer new
 constexpr double kHttpPerSecond = 100.0;
 constexpr double kHttpBurst = 300.0;
@@ -220,7 +220,8 @@ ViewServer::Response ViewServer::answer(const Request& request) {
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refusal(http::status::method_not_allowed, "only GET is served");
   }
-  if (request.target() == kStatusPath) return make_response(http::status::ok, "application/json", *viewers_.board.api_status());
+  if (request.target() == kStatusPath)
+    return make_response(http::status::ok, "application/json", *viewers_.board.api_status());
   if (request.target() == kStreamPath) return refusal(http::status::upgrade_required, "this is a WebSocket");
   const std::string_view target = request.target().substr(0, request.target().find('?'));
   const auto files = web_files();

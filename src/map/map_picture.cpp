@@ -10,35 +10,34 @@ namespace {
 
 using Changes = std::array<std::vector<VoxelChange>, kLevels>;
 
-VoxelChange change_of(const CellIndex& tile, std::uint64_t voxel, int cells_per_tile, bool gone) {
-  return {world_cell(tile, TileVoxel::cell(voxel), cells_per_tile), TileVoxel::intensity(voxel), TileVoxel::live(voxel),
+VoxelChange change_of(const TileGrid& grid, std::size_t level, const CellIndex& tile, std::uint64_t voxel, bool gone) {
+  return {grid.world_cell(level, tile, TileVoxel::cell(voxel)), TileVoxel::intensity(voxel), TileVoxel::live(voxel),
           gone};
 }
 
 void add_all(const TilePicture& tile, const TileGrid& grid, bool gone, Changes& changes) {
   for (std::size_t i = 0; i < kLevels; ++i) {
     for (const std::uint64_t voxel : tile.voxels[i]) {
-      changes[i].push_back(change_of(tile.tile, voxel, grid.cells_per_tile[i], gone));
+      changes[i].push_back(change_of(grid, i, tile.tile, voxel, gone));
     }
   }
 }
 
 void add_difference(const TilePicture& older, const TilePicture& newer, const TileGrid& grid, Changes& changes) {
   for (std::size_t i = 0; i < kLevels; ++i) {
-    const int cells = grid.cells_per_tile[i];
     auto before = older.voxels[i].begin();
     auto after = newer.voxels[i].begin();
     while (before != older.voxels[i].end() || after != newer.voxels[i].end()) {
-      const bool only_before = after == newer.voxels[i].end() || (before != older.voxels[i].end() &&
-                                                                  TileVoxel::cell(*before) < TileVoxel::cell(*after));
-      const bool only_after = before == older.voxels[i].end() || (after != newer.voxels[i].end() &&
-                                                                  TileVoxel::cell(*after) < TileVoxel::cell(*before));
+      const bool only_before = after == newer.voxels[i].end() ||
+                               (before != older.voxels[i].end() && TileVoxel::cell(*before) < TileVoxel::cell(*after));
+      const bool only_after = before == older.voxels[i].end() ||
+                              (after != newer.voxels[i].end() && TileVoxel::cell(*after) < TileVoxel::cell(*before));
       if (only_before) {
-        changes[i].push_back(change_of(older.tile, *before++, cells, true));
+        changes[i].push_back(change_of(grid, i, older.tile, *before++, true));
       } else if (only_after) {
-        changes[i].push_back(change_of(newer.tile, *after++, cells, false));
+        changes[i].push_back(change_of(grid, i, newer.tile, *after++, false));
       } else {
-        if (*before != *after) changes[i].push_back(change_of(newer.tile, *after, cells, false));
+        if (*before != *after) changes[i].push_back(change_of(grid, i, newer.tile, *after, false));
         ++before;
         ++after;
       }
@@ -47,13 +46,6 @@ void add_difference(const TilePicture& older, const TilePicture& newer, const Ti
 }
 
 }  // namespace
-
-CellIndex world_cell(const CellIndex& tile, std::uint32_t cell_in_tile, int cells_per_tile) {
-  const auto n = static_cast<std::uint32_t>(cells_per_tile);
-  return {tile.x * cells_per_tile + static_cast<std::int32_t>(cell_in_tile / (n * n)),
-          tile.y * cells_per_tile + static_cast<std::int32_t>(cell_in_tile / n % n),
-          tile.z * cells_per_tile + static_cast<std::int32_t>(cell_in_tile % n)};
-}
 
 void HeightRange::add(double height) {
   min = std::min(min, height);
@@ -69,8 +61,8 @@ std::uint64_t checksum_of(const TilePicture& picture, const TileGrid& grid) {
   std::uint64_t sum = 0;
   for (std::size_t i = 0; i < kLevels; ++i) {
     for (const std::uint64_t voxel : picture.voxels[i]) {
-      sum += voxel_checksum(i, world_cell(picture.tile, TileVoxel::cell(voxel), grid.cells_per_tile[i]),
-                            TileVoxel::intensity(voxel), TileVoxel::live(voxel));
+      sum += voxel_checksum(i, grid.world_cell(i, picture.tile, TileVoxel::cell(voxel)), TileVoxel::intensity(voxel),
+                            TileVoxel::live(voxel));
     }
   }
   return sum;

@@ -12,18 +12,9 @@
 #include "common/pose.h"
 #include "common/time.h"
 #include "map/cell_index.h"
+#include "map/tile_grid.h"
 
 namespace ignis {
-
-inline constexpr std::size_t kLevels = 3;  ///< fine to coarse: local, mid, coarse
-
-/// How the world is cut into tiles: cubes that hold a whole number of cells of every level.
-struct TileGrid {
-  std::array<double, kLevels> cell_m{};     ///< [m]
-  std::array<int, kLevels> cells_per_tile{};  ///< along one edge
-
-  [[nodiscard]] double tile_m() const { return cell_m[0] * cells_per_tile[0]; }
-};
 
 /// A voxel inside its tile, packed so that sorting by the number sorts by the cell: cell within the tile (x slowest, z
 /// fastest), intensity, live flag.
@@ -35,9 +26,6 @@ struct TileVoxel {
   static constexpr std::uint8_t intensity(std::uint64_t packed) { return static_cast<std::uint8_t>(packed >> 8); }
   static constexpr bool live(std::uint64_t packed) { return (packed & 1) != 0; }
 };
-
-/// The cell of the world that a number within a tile stands for.
-[[nodiscard]] CellIndex world_cell(const CellIndex& tile, std::uint32_t cell_in_tile, int cells_per_tile);
 
 /// Lowest and highest point of some voxels, world Y [m]. Empty: min > max.
 struct HeightRange {
@@ -85,8 +73,8 @@ struct MapPicture {
   double radius_m = 0.0;
   Pose T_map_body;
   TileGrid grid;
-  std::array<CellIndex, kLevels> origins;   ///< per level, the cell of the windows' centre
-  std::vector<SharedTilePicture> tiles;     ///< ascending by tile, none empty
+  std::array<CellIndex, kLevels> origins;  ///< per level, the cell of the windows' centre
+  std::vector<SharedTilePicture> tiles;    ///< ascending by tile, none empty
   std::array<std::uint32_t, kLevels> counts{};
   std::array<HeightRange, kLevels> heights;
   std::uint64_t checksum = 0;

@@ -3,42 +3,80 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace ignis {
+namespace {
 
-TileGrid tile_grid(const MapConfig& config) {
-  TileGrid grid;
-  grid.cell_m = {config.local_cell_m, config.mid_cell_m, config.coarse_cell_m};
-  for (std::size_t i = 0; i < kLevels; ++i) {
-    grid.cells_per_tile[i] = 8 * static_cast<int>(std::lround(config.coarse_cell_m / grid.cell_m[i]));
-  }
-  return grid;
+std::uint8_t byte_of(float intensity) { return static_cast<std::uint8_t>(std::clamp(intensity, 0.0F, 255.0F)); }
+
+}  // namespace
+
+MapPicture PictureBuilder::build(const ThreeLevelMap& map) {
+  const Windows& windows = map.windows();
+  std::array<double, kLevels> radii = windows.radius_m;
+  for (std::size_t i = 1; i < kLevels; ++i) radii[i] = std::min(radii[i], radius_m_);
+  ++builds_;
+  std::vector<SharedTilePicture> shown;
+  map.for_each_tile([&](const Tile& tile) {
+    const Box box = tile_box(tile.index(), map.grid().tile_m());
+    std::array<Reach, kLevels> reach{};
+    for (std::size_t i = 0; i < kLevels; ++i) {
+      reach[i] = has(tile.held, i) ? windows.reach(radii[i], box) : Reach::kOutside;
+    }
+    if (std::ranges::count(reach, Reach::kOutside) == kLevels) return;
+    Cached& cached = cache_[pack(tile.index())];
+    cached.build = builds_;
+    if (!is_current(cached, tile, reach, windows.centre)) {
+      TilePicture picture = show(map, tile, reach, radii);
+      if (!cached.picture || *cached.picture != picture) {
+        cached.picture = std::make_shared<const TilePicture>(std::move(picture));
+      }
+      cached.version = tile.version();
+      cached.reach = reach;
+      cached.centre = windows.centre;
+    }
+    shown.push_back(cached.picture);
+  });
+  boost::unordered::erase_if(cache_, [&](const auto& entry) { return entry.second.build != builds_; });
+  std::ranges::sort(shown, {}, [](const SharedTilePicture& tile) { return tile->tile; });
+  MapPicture picture;
+  picture.radius_m = radius_m_;
+  picture.grid = map.grid();
+  for (std::size_t i = 0; i < kLevels; ++i) picture.origins[i] = map.locator().cell_of(i, windows.centre);
+  picture.tiles.reserve(shown.size());
+  for (SharedTilePicture& tile : shown) picture.add(std::move(tile));
+  return picture;
 }
 
-MapPicture picture_of(const ThreeLevelMap& map, const TileGrid& grid, double radius_m) {
-  const MapView view = map.view(radius_m);
-  MapPicture picture;
-  picture.grid = grid;
-  picture.radius_m = radius_m;
-  std::map<CellIndex, TilePicture> tiles;
+bool PictureBuilder::is_current(const Cached& cached, const Tile& tile, const std::array<Reach, kLevels>& reach,
+                                const Eigen::Vector3d& centre) {
+  if (!cached.picture || cached.version != tile.version() || cached.reach != reach) return false;
+  return std::ranges::count(reach, Reach::kPartly) == 0 || cached.centre == centre;
+}
+
+TilePicture PictureBuilder::show(const ThreeLevelMap& map, const Tile& tile, const std::array<Reach, kLevels>& reach,
+                                 const std::array<double, kLevels>& radii) {
+  const TileGrid& grid = map.grid();
+  TilePicture picture;
+  picture.tile = tile.index();
+  for (std::size_t i = 1; i < kLevels; ++i) {
+    const auto n = static_cast<std::size_t>(grid.cells_per_tile[i]);
+    covered_[i].assign(n * n * n, 0);
+  }
   for (std::size_t i = 0; i < kLevels; ++i) {
-    picture.origins[i] = view[i].origin;
-    const int n = grid.cells_per_tile[i];
-    for (const ViewVoxel& voxel : view[i].voxels) {
-      const CellIndex tile = parent_cell(voxel.cell, n);
-      const int cell = ((voxel.cell.x - tile.x * n) * n + voxel.cell.y - tile.y * n) * n + voxel.cell.z - tile.z * n;
-      TilePicture& target = tiles[tile];
-      target.tile = tile;
-      target.voxels[i].push_back(TileVoxel::pack(static_cast<std::uint32_t>(cell), voxel.intensity, voxel.live));
-      target.heights[i].add(map.level(i).find(voxel.cell)->p_world.y());
+    if (reach[i] == Reach::kOutside) continue;
+    std::vector<std::uint64_t>& voxels = picture.voxels[i];
+    for (const auto& [cell, voxel] : tile.level(i)) {
+      if (i > 0 && covered_[i][cell] != 0) continue;
+      const Eigen::Vector3d centre = grid.centre_of(i, grid.world_cell(i, tile.index(), cell));
+      if (reach[i] == Reach::kPartly && !map.windows().contains(radii[i], centre)) continue;
+      voxels.push_back(TileVoxel::pack(cell, byte_of(voxel.intensity), voxel.keyframe_id == map.open_cloud()));
+      picture.heights[i].add(centre.y() + static_cast<double>(voxel.from_centre.y()));
+      for (std::size_t k = i + 1; k < kLevels; ++k) covered_[k][map.locator().parent_in_tile(i, k, cell)] = 1;
     }
+    std::ranges::sort(voxels);
   }
-  for (auto& [index, tile] : tiles) {
-    for (auto& voxels : tile.voxels) std::ranges::sort(voxels);
-    tile.checksum = checksum_of(tile, grid);
-    picture.add(std::make_shared<const TilePicture>(std::move(tile)));
-  }
+  picture.checksum = checksum_of(picture, grid);
   return picture;
 }
 

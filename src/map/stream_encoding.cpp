@@ -66,7 +66,7 @@ Records all_records(const MapPicture& picture) {
     records[i].reserve(picture.counts[i]);
     for (const SharedTilePicture& tile : picture.tiles) {
       for (const std::uint64_t voxel : tile->voxels[i]) {
-        const CellIndex cell = world_cell(tile->tile, TileVoxel::cell(voxel), picture.grid.cells_per_tile[i]);
+        const CellIndex cell = picture.grid.world_cell(i, tile->tile, TileVoxel::cell(voxel));
         const std::uint8_t flags = TileVoxel::live(voxel) ? kLiveFlag : 0;
         if (const auto record = record_of(cell, picture.origins[i], TileVoxel::intensity(voxel), flags)) {
           records[i].push_back(*record);

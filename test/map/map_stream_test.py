@@ -3,7 +3,6 @@
 
 import json
 import math
-import struct
 import threading
 import time
 
@@ -11,6 +10,7 @@ import lcm
 import numpy as np
 import pytest
 from ignis_lcm import ignis as types
+from stream_client import ViewState
 
 URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 SCAN_PERIOD = 0.05
@@ -93,6 +93,7 @@ class Drive:
         loop = types.loop_result_t()
         loop.keyframes, loop.candidates, loop.passed, loop.accepted = len(self.keyframes), 1, 1, 1
         loop.from_id, loop.to_id, loop.correction_m = len(self.keyframes) - 1, 0, 0.3
+        loop.stage, loop.reason_text = types.loop_result_t.STAGE_ON_TRIAL, "accepted"
         loop.relative_quaternion = [1.0, 0.0, 0.0, 0.0]
         self.bus.publish("LOOP_RESULT", loop.encode())
 
@@ -114,48 +115,44 @@ class Drive:
         self.bus.publish("SMOOTHED_KEYFRAMES", graph.encode())
 
 
-def decode(frame):
-    """docs/wire_format.md once more, in Python."""
-    levels, at = [], 76
-    for k in range(3):
-        cell, count = struct.unpack_from("<fI", frame, 28 + 16 * k)
-        origin = np.array(struct.unpack_from("<3i", frame, at))
-        records = np.frombuffer(
-            frame, dtype=[("cell", "<i2", 3), ("intensity", "u1"), ("flags", "u1")], count=count, offset=at + 12
-        )
-        levels.append((cell * (records["cell"] + origin + 0.5), records["flags"]))
-        at += 12 + 8 * count
-    parts = []
-    for size in (3, 3, 6):
-        (count,) = struct.unpack_from("<I", frame, at)
-        parts.append(np.frombuffer(frame, "<f4", size * count, at + 4).reshape(-1, size))
-        at += 4 + 4 * size * count
-    assert at == len(frame)
-    return np.array(struct.unpack_from("<7f", frame)), levels, *parts
-
-
 class Viewer(threading.Thread):
-    """Collects frames and the newest status text in the background."""
+    """Keeps a view by the stream in the background, checks each announcement, and collects the texts."""
 
     def __init__(self, server):
         super().__init__(daemon=True)
         status, self.socket = server.upgrade()
         assert status == 101
-        self.frames, self.times, self.hud = [], [], None
+        self.state, self.lock = ViewState(), threading.Lock()
+        self.times, self.sizes, self.hud, self.failure = [], [], None, None
+        self.texts = {}
         self.start()
 
     def run(self):
+        announced = None
         try:
-            while True:
+            while self.failure is None:
                 opcode, payload = self.socket.receive()
-                if opcode == 2:
-                    self.frames.append(payload)
+                if opcode == 2 and announced["type"] == "frame":
+                    with self.lock:
+                        self.state.apply(announced, payload)
                     self.times.append(time.monotonic())
+                    self.sizes.append((announced["kind"], len(payload)))
+                elif opcode == 2:
+                    self.texts[announced["type"]].append(payload)
                 elif opcode == 1:
-                    message = json.loads(payload)
-                    self.hud = message if message["type"] == "hud" else self.hud
+                    announced = json.loads(payload)
+                    self.texts.setdefault(announced["type"], []).append(announced)
+                    self.hud = announced if announced["type"] == "hud" else self.hud
         except OSError:
             pass
+        except Exception as error:  # the test's thread must hear of it
+            self.failure = error
+
+    def view(self):
+        """Pose, and per level the voxels' centres with their live flags."""
+        assert self.failure is None, repr(self.failure)
+        with self.lock:
+            return np.array(self.state.pose), [self.state.centres(level) for level in range(3)]
 
     def wait_for(self, condition, seconds=10):
         deadline = time.monotonic() + seconds
@@ -185,13 +182,13 @@ def test_a_drive_shows_walls_where_they_are_on_all_three_levels(running):
     drive_for(drive, 24)
     viewer.wait_for(lambda hud: hud["map"]["clouds_inserted"] == drive.step)
     time.sleep(0.5)
-    pose, levels, odometry, smoothed, edges = decode(viewer.frames[-1])
+    pose, levels = viewer.view()
+    odometry, smoothed, edges = viewer.state.odometry, viewer.state.smoothed, viewer.state.edges
     assert np.allclose(pose[:3], drive.position() - [0, 0, -SPEED * SCAN_PERIOD], atol=1e-3)
     for points, flags in levels:
         assert len(points) > 100
         on_a_surface = (np.abs(np.abs(points[:, 0]) - WALL_X) < 0.5) | (np.abs(points[:, 1] + 0.5) < 0.5)
         assert on_a_surface.all()
-        assert (flags == 1).all()
     distance = [np.hypot(*(points[:, [0, 2]] - pose[[0, 2]]).T) for points, _ in levels]
     assert distance[0].max() < 10.7
     assert 10 < distance[1].max() < 30.7
@@ -209,23 +206,24 @@ def test_a_loop_rebuilds_the_map_at_the_corrected_poses_and_the_stream_goes_on(r
     viewer, drive = Viewer(running), Drive(drift=0.005)
     drive_for(drive, 12)
     viewer.wait_for(lambda hud: hud["map"]["clouds_inserted"] == drive.step)
-    drifted = decode(viewer.frames[-1])
+    _, drifted = viewer.view()
     drive.publish_loop()
     drive.publish_correction(1)
     drive_for(drive, 2)
-    viewer.wait_for(lambda hud: hud["map"]["rebuilds"] > 0 and hud["map"]["clouds_inserted"] == drive.step)
+    viewer.wait_for(lambda hud: hud["map"]["revision"] == 1 and hud["map"]["clouds_inserted"] == drive.step)
     time.sleep(0.5)
-    _, levels, odometry, smoothed, edges = decode(viewer.frames[-1])
+    _, levels = viewer.view()
+    odometry, smoothed, edges = viewer.state.odometry, viewer.state.smoothed, viewer.state.edges
     assert viewer.hud["map"]["revision"] == 1
     assert len(edges) == 1
     assert np.abs(odometry[:, 0]).max() > 0.9
     # What is left: drift within a keyframe's stretch, and that of the 2 s since the correction.
     assert np.abs(smoothed[:, 0]).max() < 0.35
     walls = levels[1][0][np.abs(levels[1][0][:, 1] - 0.7) < 0.6]
-    before = drifted[1][1][0][np.abs(drifted[1][1][0][:, 1] - 0.7) < 0.6]
+    before = drifted[1][0][np.abs(drifted[1][0][:, 1] - 0.7) < 0.6]
     spread = [np.abs(np.abs(points[:, 0]) - WALL_X).max() for points in (before, walls)]
     assert spread[0] > 0.6 > 0.4 > spread[1]
-    assert (levels[1][1] == 0).mean() > 0.9, "the map was not rebuilt from keyframes"
+    assert (levels[1][1] == 0).mean() > 0.5, "most of what is shown belongs to closed keyframes"
     assert max(np.diff(viewer.times)) < 1.0, "the stream stopped"
 
 
@@ -239,7 +237,7 @@ def test_a_new_session_starts_an_empty_map(running):
     cloud.num_points = 1
     cloud.x, cloud.y, cloud.z, cloud.intensity = [1.0], [0.0], [0.0], [9.0]
     drive.bus.publish("LIO_CLOUD", cloud.encode())
-    viewer.wait_for(lambda hud: sum(hud["map"]["voxels"]) == 1)
+    viewer.wait_for(lambda hud: hud["map"]["voxels"] == [1, 1, 1])
     assert before > 1000
 
 
