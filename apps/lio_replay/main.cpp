@@ -3,14 +3,16 @@
 // lio_replay: the whole pipeline over an LCM log, in one process and in log-time order, as fast as the machine allows.
 // The same log gives the same bytes.
 
+#include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <format>
 #include <iostream>
-#include <optional>
-
-#include <unistd.h>
+#include <memory>
+#include <thread>
 
 #include "replay_output.h"
+#include "replay_progress.h"
 #include "runtime/stop_signal.h"
 
 namespace {
@@ -20,34 +22,42 @@ using namespace ignis;
 struct Options {
   std::string log;
   std::string folder;
+  std::string speed = "max";
+  double until_s = 0.0;  ///< 0: to the end
   bool no_loops = false;
 };
 
-/// One line on the error stream that tells how far the replay is; rewritten on a terminal, every tenth in a log.
-class Progress {
+/// How fast the drive passes: as fast as the machine allows, or so many times real time.
+class Pace {
  public:
-  explicit Progress(const LogInventory& inventory) : inventory_(inventory) {}
+  explicit Pace(double speed) : speed_(speed) {}
 
-  void show(Utime utime) {
-    const double total = seconds_between(inventory_.first_utime, inventory_.last_utime);
-    const double done = seconds_between(inventory_.first_utime, utime);
-    const int percent = total > 0.0 ? static_cast<int>(100.0 * done / total) : 100;
-    if (percent < shown_ + (terminal_ ? 1 : 10)) return;
-    shown_ = percent;
-    const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
-    const double left = done > 0.0 ? spent * (total - done) / done : 0.0;
-    std::cerr << std::format("{}replay {:3d} %: {:.1f} of {:.1f} s, {:.1f} times real time, {:.0f} s left{}",
-                             terminal_ ? "\r" : "", percent, done, total, done / std::max(spent, 1e-9), left,
-                             terminal_ ? "   " : "\n");
-    if (terminal_ && percent >= 100) std::cerr << '\n';
+  /// Sleeps until it is this measurement's turn, in short steps so that a stop is noticed.
+  void wait_for(double drive_s) const {
+    if (speed_ <= 0.0) return;
+    const auto due = began_ + std::chrono::duration<double>(drive_s / speed_);
+    while (std::chrono::steady_clock::now() < due && !runtime::stop_requested()) {
+      const auto step = std::chrono::steady_clock::now() + std::chrono::milliseconds(50);
+      std::this_thread::sleep_until(std::min<decltype(due)>(due, step));
+    }
   }
 
  private:
-  const LogInventory& inventory_;
-  bool terminal_ = isatty(STDERR_FILENO) != 0;
-  int shown_ = -100;
+  double speed_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
+
+/// 0 for "max", which means no pace.
+double speed_of(const std::string& text) {
+  if (text == "max") return 0.0;
+  double speed = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), speed);
+  if (error != std::errc{} || end != text.data() + text.size() || !(speed > 0.0) || speed > 1e6) {
+    throw runtime::UserError(
+        std::format("--speed {}: allowed is max, or how many times real time (1 is real time)", text));
+  }
+  return speed;
+}
 
 std::unique_ptr<ReplayInput> open_log(const std::string& file) {
   try {
@@ -64,22 +74,30 @@ void make_folder(const std::string& folder) {
 }
 
 runtime::ExitCode replay(const runtime::Application& application, const Options& options) {
+  const double speed = speed_of(options.speed);
   const auto began = std::chrono::steady_clock::now();
   const std::unique_ptr<ReplayInput> input = open_log(options.log);
   make_folder(options.folder);
   ReplayPipeline pipeline(application.config, !options.no_loops);
-  Progress progress(input->inventory());
+  const Utime first = input->inventory().first_utime;
+  const Utime last = options.until_s > 0.0 ? std::min(input->inventory().last_utime, first + to_micros(options.until_s))
+                                           : input->inventory().last_utime;
+  ReplayProgress progress(first, last);
+  const Pace pace(speed);
   input->run([&](const ImuSample& sample) { pipeline.add_imu(sample); },
              [&](const Scan& scan) { pipeline.add_scan(scan); },
              [&](Utime utime) {
+               if (utime > last) return false;
                progress.show(utime);
+               pace.wait_for(seconds_between(first, utime));
                return !runtime::stop_requested();
              });
   const ReplayResult result = pipeline.finish();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - began;
   const ReplayTiming timing{.wall_s = wall.count()};
-  write_results(options.folder, application, options.log, *input, pipeline, result, timing);
-  std::cout << summary(*input, result, timing) << std::format("results:    {}\n", options.folder);
+  const ReplaySource source{options.log, *input, agreement_with_live(input->live_scan_stats(), result.scans)};
+  write_results(options.folder, application, source, pipeline, result, timing);
+  std::cout << summary(source, result, timing) << std::format("results:    {}\n", options.folder);
   if (result.odometry.empty()) {
     throw runtime::UserError(std::format("no pose was computed: {}", result.start), runtime::kFailed);
   }
@@ -98,6 +116,9 @@ int main(int argc, char** argv) {
         app.add_option("log", options.log, "LCM log with L1_IMU and L1_SCAN");
         app.add_option("-o,--out", options.folder, "folder for the results");
         app.add_flag("--no-loops", options.no_loops, "leave out loop closing");
+        app.add_option("--speed", options.speed, "max (default), or how many times real time; 1 is real time");
+        app.add_option("--until", options.until_s, "end so many seconds behind the log's first measurement")
+            ->check(CLI::Range(1e-3, 1e9));
       },
       [&](const runtime::Application& application) {
         if (options.log.empty() || options.folder.empty()) {

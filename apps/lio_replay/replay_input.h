@@ -5,12 +5,16 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/measurements.h"
 #include "common/trajectory_file.h"
+#include "log_listing.h"
 #include "messages/lcm_log.h"
+#include "recorded_drop.h"
 
 namespace ignis {
 
@@ -23,13 +27,16 @@ struct LogInventory {
   std::int64_t missing_imu = 0;                 ///< by the running number
   std::int64_t missing_scans = 0;               ///< by the running number
   std::int64_t damaged_bytes = 0;               ///< of the file, in no whole record
+  std::int64_t out_of_order = 0;                ///< measurements that stand behind a later one of their channel
+  std::optional<RecordedDrop> first_drop;       ///< up to here a replay must equal the live run
   Utime first_utime = 0;                        ///< [us] of the first measurement
   Utime last_utime = 0;
 
   [[nodiscard]] bool damaged() const { return undecodable > 0 || damaged_bytes > 0 || incomplete_scans > 0; }
 };
 
-/// The measurements of a log, in the order of their own stamps per channel: under load LCM records out of order.
+/// The measurements of a log, in the order of their own stamps per channel: under load LCM records out of order. The
+/// log stays on disk: it is mapped, and what is kept of a message is its stamp and place.
 class ReplayInput {
  public:
   /// Indexes the log. Throws std::runtime_error when it is no log or holds no IMU or no scans.
@@ -37,6 +44,9 @@ class ReplayInput {
 
   [[nodiscard]] const LogInventory& inventory() const { return inventory_; }
   [[nodiscard]] const Trajectory& ground_truth() const { return ground_truth_; }
+
+  /// LIO_SCAN_STATS of the live front end, encoded, in the order of the log; none in a log of sensor data alone.
+  [[nodiscard]] const std::vector<std::span<const std::byte>>& live_scan_stats() const { return live_scan_stats_; }
 
   /// Calls the handlers with every measurement, in time order; stops early when `proceed` returns false.
   void run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(const Scan&)>& on_scan,
@@ -50,12 +60,18 @@ class ReplayInput {
   };
 
   void index(const messages::LogEvent& event);
+  void index_measurement(const messages::LogEvent& event, bool is_scan);
   void index_ground_truth(const messages::LogEvent& event);
+  void index_health(const messages::LogEvent& event);
+  void require(const std::filesystem::path& file, const char* channel) const;
+  void sort_entries();
   void count_missing();
 
   messages::LcmLog log_;
+  LogListing listing_;
   LogInventory inventory_;
   std::vector<Entry> entries_;
+  std::vector<std::span<const std::byte>> live_scan_stats_;
   Trajectory ground_truth_;
 };
 

@@ -23,8 +23,10 @@ std::int64_t applied_scans(const ReplayResult& result) {
   return std::ranges::count_if(result.scans, [](const ScanStats& scan) { return scan.applied(); });
 }
 
-double drive_seconds(const ReplayInput& input) {
-  return seconds_between(input.inventory().first_utime, input.inventory().last_utime);
+/// [s] from the first measurement to the last scan or, without any, to the end of the log.
+double drive_seconds(const ReplayInput& input, const ReplayResult& result) {
+  const Utime last = result.scans.empty() ? input.inventory().last_utime : result.scans.back().utime;
+  return seconds_between(input.inventory().first_utime, last);
 }
 
 void write_scan_stats(const std::filesystem::path& file, const ReplayResult& result) {
@@ -89,6 +91,16 @@ void write_loops(const std::filesystem::path& file, const ReplayResult& result) 
   output.commit();
 }
 
+/// Apart from the other tables, whose bytes do not depend on the machine.
+void write_timing(const std::filesystem::path& file, const ReplayResult& result) {
+  FileOutput output(file);
+  output.stream() << "utime,frontend_ms\n";
+  for (std::size_t i = 0; i < result.scans.size(); ++i) {
+    output.stream() << std::format("{},{:.4f}\n", result.scans[i].utime, result.scan_times_ms[i]);
+  }
+  output.commit();
+}
+
 void write_text(const std::filesystem::path& file, const std::string& content) {
   FileOutput output(file);
   output.stream() << content;
@@ -119,6 +131,13 @@ std::vector<double> medians_by_quarter(const std::vector<double>& values) {
   return medians;
 }
 
+Json drop_json(const LogInventory& inventory) {
+  if (!inventory.first_drop) return nullptr;
+  return {{"s", seconds_between(inventory.first_utime, inventory.first_drop->utime)},
+          {"utime", inventory.first_drop->utime},
+          {"what", inventory.first_drop->what}};
+}
+
 Json inventory_json(const LogInventory& inventory) {
   return {{"used", inventory.used},
           {"ignored", inventory.ignored},
@@ -126,20 +145,36 @@ Json inventory_json(const LogInventory& inventory) {
           {"incomplete_scans", inventory.incomplete_scans},
           {"missing_imu", inventory.missing_imu},
           {"missing_scans", inventory.missing_scans},
-          {"damaged_bytes", inventory.damaged_bytes}};
+          {"damaged_bytes", inventory.damaged_bytes},
+          {"out_of_order", inventory.out_of_order},
+          {"first_utime", inventory.first_utime},
+          {"first_drop", drop_json(inventory)}};
 }
 
-Json report(const runtime::Application& application, const std::filesystem::path& log, const ReplayInput& input,
-            const ReplayPipeline& pipeline, const ReplayResult& result, const ReplayTiming& timing) {
-  const double seconds = drive_seconds(input);
+Json live_json(const LiveAgreement& live, Utime first) {
+  Json json = {{"recorded_scans", live.recorded},
+               {"equal_scans", live.equal},
+               {"first_sequence", live.first_sequence},
+               {"largest_distance_m", live.largest_distance_m},
+               {"first_unequal_s", nullptr}};
+  if (live.first_unequal) json["first_unequal_s"] = seconds_between(first, *live.first_unequal);
+  return json;
+}
+
+Json report(const runtime::Application& application, const ReplaySource& source, const ReplayPipeline& pipeline,
+            const ReplayResult& result, const ReplayTiming& timing) {
+  const ReplayInput& input = source.input;
+  const double seconds = drive_seconds(input, result);
   const auto accepted = std::ranges::count_if(result.loops, [](const LoopResult& loop) { return loop.accepted(); });
   Json json;
-  json["log"] = log.filename().string();
+  json["log"] = source.log.filename().string();
+  json["log_path"] = std::filesystem::absolute(source.log).lexically_normal().string();
   json["version"] = runtime::version();
   json["config_hash"] = application.config_hash;
   json["start"] = result.start;
   json["duration_s"] = seconds;
   json["input"] = inventory_json(input.inventory());
+  json["live"] = live_json(source.live, input.inventory().first_utime);
   json["imu_samples"] = result.imu_samples;
   json["imu_rejected"] = result.rejected_imu;
   json["scans"] = result.scans.size();
@@ -192,6 +227,44 @@ Trajectory sampled(const Trajectory& truth, const Trajectory& stamps) {
   return rows;
 }
 
+std::string losses(const LogInventory& inventory) {
+  std::string text;
+  if (inventory.missing_imu + inventory.missing_scans > 0) {
+    text += std::format("missing:    {} IMU samples and {} scans by their running numbers\n", inventory.missing_imu,
+                        inventory.missing_scans);
+  }
+  if (inventory.out_of_order > 0) {
+    text += std::format("order:      {} measurements were recorded late and put in the order of their stamps\n",
+                        inventory.out_of_order);
+  }
+  if (inventory.damaged()) {
+    text += std::format("damaged:    {} bytes in no whole record, {} messages undecodable, {} scans incomplete\n",
+                        inventory.damaged_bytes, inventory.undecodable, inventory.incomplete_scans);
+  }
+  if (inventory.first_drop) {
+    text +=
+        std::format("first drop: at {:.3f} s: {}\n",
+                    seconds_between(inventory.first_utime, inventory.first_drop->utime), inventory.first_drop->what);
+  }
+  return text;
+}
+
+/// Whether the replay gave what the live run had given.
+std::string agreement(const ReplaySource& source) {
+  const LiveAgreement& live = source.live;
+  if (live.recorded == 0) return {};
+  std::string text = std::format("live run:   {} of {} recorded scans equal bit for bit", live.equal, live.recorded);
+  if (live.first_unequal) {
+    text += std::format("; the first that differs ends at {:.3f} s, positions differ by at most {:.6f} m",
+                        seconds_between(source.input.inventory().first_utime, *live.first_unequal),
+                        live.largest_distance_m);
+    if (live.first_sequence > 0) {
+      text += std::format("; the recording began when the live run had {} scans behind it", live.first_sequence);
+    }
+  }
+  return text + '\n';
+}
+
 }  // namespace
 
 std::string trajectory_hash(const ReplayResult& result) {
@@ -207,13 +280,12 @@ std::string trajectory_hash(const ReplayResult& result) {
 }
 
 std::filesystem::path write_results(const std::filesystem::path& folder, const runtime::Application& application,
-                                    const std::filesystem::path& log, const ReplayInput& input,
-                                    const ReplayPipeline& pipeline, const ReplayResult& result,
-                                    const ReplayTiming& timing) {
+                                    const ReplaySource& source, const ReplayPipeline& pipeline,
+                                    const ReplayResult& result, const ReplayTiming& timing) {
   write_tum(folder / "eskf.tum", result.odometry);
   write_tum(folder / "smoothed.tum", result.smoothed);
-  if (!input.ground_truth().empty()) {
-    write_tum(folder / "ground_truth.tum", sampled(input.ground_truth(), result.odometry));
+  if (!source.input.ground_truth().empty()) {
+    write_tum(folder / "ground_truth.tum", sampled(source.input.ground_truth(), result.odometry));
   }
   write_pose_graph(folder / "keyframes.g2o", result.graph);
   write_pcd(folder / "map.pcd", pipeline.voxels());
@@ -221,14 +293,15 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const r
   write_scan_stats(folder / "scan_stats.csv", result);
   write_states(folder / "eskf_states.csv", result);
   write_loops(folder / "loops.csv", result);
+  write_timing(folder / "timing.csv", result);
   write_text(folder / "config.json", print_config(application.config));
   const std::filesystem::path file = folder / "report.json";
-  write_text(file, report(application, log, input, pipeline, result, timing).dump(2) + '\n');
+  write_text(file, report(application, source, pipeline, result, timing).dump(2) + '\n');
   return file;
 }
 
-std::string summary(const ReplayInput& input, const ReplayResult& result, const ReplayTiming& timing) {
-  const double seconds = drive_seconds(input);
+std::string summary(const ReplaySource& source, const ReplayResult& result, const ReplayTiming& timing) {
+  const double seconds = drive_seconds(source.input, result);
   std::string text = std::format("start:      {}\n", result.start);
   text +=
       std::format("drive:      {:.1f} s, {} IMU samples, {} scans\n", seconds, result.imu_samples, result.scans.size());
@@ -243,16 +316,7 @@ std::string summary(const ReplayInput& input, const ReplayResult& result, const 
                   timing.wall_s, seconds / std::max(timing.wall_s, 1e-9), quantile(result.scan_times_ms, 0.5),
                   quantile(result.scan_times_ms, 0.99));
   text += std::format("trajectory: {}\n", trajectory_hash(result));
-  const LogInventory& inventory = input.inventory();
-  if (inventory.missing_imu + inventory.missing_scans > 0) {
-    text += std::format("missing:    {} IMU samples and {} scans by their running numbers\n", inventory.missing_imu,
-                        inventory.missing_scans);
-  }
-  if (inventory.damaged()) {
-    text += std::format("damaged:    {} bytes in no whole record, {} messages undecodable, {} scans incomplete\n",
-                        inventory.damaged_bytes, inventory.undecodable, inventory.incomplete_scans);
-  }
-  return text;
+  return text + losses(source.input.inventory()) + agreement(source);
 }
 
 }  // namespace ignis

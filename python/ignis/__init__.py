@@ -1,2 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Analysis of IGNIS LIO runs: importing recordings, reading logs, comparing trajectories, running the demo."""
+"""Analysis tools of IGNIS LIO: import, replay, compare, pictures. For notebooks: read_log and read_run."""
+
+from ignis.log_arrays import ChannelArrays, LogArrays, read_log
+from ignis.run_folder import Run, read_run
+
+__all__ = ["ChannelArrays", "LogArrays", "Run", "read_log", "read_run"]

@@ -134,6 +134,8 @@ def _scene_files(arguments: argparse.Namespace) -> list[Path]:
 def _run_all(build: Path, drive: Drive, config: Path, python: Path | None, arguments: argparse.Namespace):
     out = arguments.out / "runs" / f"{drive.scene}_{drive.seed}"
     yield from run_ours(build / "lio_replay", drive, config, out / "ours", arguments.core)
+    if python is None:
+        return
     for name in arguments.peers:
         yield run_peer(python, name, drive, out / name, arguments.core)
 
@@ -174,7 +176,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, default=_CHECKOUT / "config" / "ignis8_tuned.json")
     parser.add_argument("--spinning-config", type=Path, default=_CHECKOUT / "config" / "spinning.json")
     parser.add_argument("--scene-folder", type=Path, default=_CHECKOUT / "config" / "scenes")
-    parser.add_argument("--core", type=int, default=os.cpu_count() - 1, help="the core that every system runs on")
+    parser.add_argument(
+        "--core", type=int, default=(os.cpu_count() or 1) - 1, help="the core that every system runs on"
+    )
     parser.add_argument("--out", type=Path, default=Path("results/bench"))
     parsed = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
     parsed.scenes = parsed.scenes or list(_QUICK_SCENES if parsed.quick else _SCENES)

@@ -55,7 +55,7 @@ def plot_errors(path: Path, aligned: dict[str, Trajectory], truth: Trajectory) -
     for label, trajectory in aligned.items():
         pair = paired(trajectory, truth)
         seconds = (pair.truth.utime - pair.truth.utime[0]) * 1e-6
-        axes.plot(seconds, position_errors(pair.estimate, pair.truth), color=_COLOURS[label], label=label)
+        axes.plot(seconds, position_errors(pair.estimate, pair.truth), color=_COLOURS.get(label), label=label)
     axes.set(xlabel="time [s]", ylabel="position error [m]", title="distance from the ground truth after alignment")
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)

@@ -96,7 +96,7 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _drive_seconds(scene: Path) -> float:
-    command = [binary("l1_sim"), "--scene", scene, "--print-scene"]
+    command: list[str | Path] = [binary("l1_sim"), "--scene", scene, "--print-scene"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         raise InputError(done.stderr.strip())

@@ -13,7 +13,7 @@ import pkgutil
 import struct
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import IO, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from ignis.errors import InputError
 _SYNC = b"\xed\xa1\xda\x01"
 _HEAD = struct.Struct(">4sqqii")
 _MAX_CHANNEL = 63
+
+# Records of these channels are no LCM messages: JSON text, and what LCM sends itself when it starts.
+RAW_CHANNELS = ("IGNIS_CONFIG", "LCM_SELF_TEST")
 
 PART_ARRAYS = {
     "scan_t": ("x", "y", "z", "intensity", "dt_us"),
@@ -123,7 +126,7 @@ def read_log(
     damage = damage if damage is not None else LogDamage()
     types = _types_by_fingerprint()
     for event in read_events(path, damage):
-        if channels is not None and event.channel not in channels:
+        if event.channel in RAW_CHANNELS or (channels is not None and event.channel not in channels):
             continue
         message_type = types.get(event.data[:8])
         try:
@@ -168,8 +171,15 @@ class LogWriter:
     """Writes records one behind the other."""
 
     def __init__(self, path: Path) -> None:
-        self._file = path.open("wb")
+        self._file: IO[bytes] = path.open("wb")
         self.events = 0
+
+    @classmethod
+    def to_stream(cls, stream: IO[bytes]) -> Self:
+        """Writes into an open stream, which stays open."""
+        writer = cls.__new__(cls)
+        writer._file, writer.events = stream, 0
+        return writer
 
     def write(self, utime: int, channel: str, data: bytes) -> None:
         name = channel.encode("ascii")

@@ -44,7 +44,7 @@ def binary(name: str) -> Path:
 
 def effective_config(config: Path) -> dict:
     """The configuration as the executables see it; raises CalledProcessError when they refuse it."""
-    command = [binary("lio_frontend"), "--config", config, "--print-config"]
+    command: list[str | Path] = [binary("lio_frontend"), "--config", config, "--print-config"]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 

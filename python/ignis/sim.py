@@ -80,7 +80,9 @@ def _bottom(solid: dict[str, Any]) -> float:
 
 def _draw_solids(axes: Axes, scene: dict[str, Any]) -> None:
     floor = min((w["position_m"][1] for w in scene["trajectory"]["waypoints"]), default=0.6) - 0.6
-    shapes = [(solid, Polygon(_box_corners(solid))) for solid in map(_complete, scene.get("boxes", []))]
+    shapes: list[tuple[dict[str, Any], Circle | Polygon]] = [
+        (solid, Polygon(_box_corners(solid))) for solid in map(_complete, scene.get("boxes", []))
+    ]
     shapes += [(solid, _cylinder_outline(solid)) for solid in map(_complete, scene.get("cylinders", []))]
     shapes += [
         (s, Circle((s["center_m"][0], s["center_m"][2]), s["radius_m"]))

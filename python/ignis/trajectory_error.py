@@ -16,7 +16,7 @@ from ignis.errors import InputError
 from ignis.mounts import R_OURS_FROM_FLU
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, quaternion_product, rotation_matrix
 
-RPE_DELTA_M = 10.0
+RPE_DELTAS_M = (1, 10)
 _FORWARD_OURS = np.array([0.0, 0.0, -1.0])
 _FORWARD_FLU = np.array([1.0, 0.0, 0.0])
 
@@ -119,12 +119,31 @@ def relative_errors(pair: Pair, relation: metrics.PoseRelation, delta: float, un
     return np.asarray(rpe.error)
 
 
+def tilt_errors(pair: Pair) -> np.ndarray:
+    """[deg] angle between estimated and true direction of up, seen from the body. Both worlds have +Y up, so no
+    alignment is needed and none could hide it."""
+    up_estimate = rotation_matrix(pair.estimate.poses.quaternion)[:, 1, :]
+    up_truth = rotation_matrix(pair.truth.poses.quaternion)[:, 1, :]
+    across = np.linalg.norm(np.cross(up_estimate, up_truth), axis=1)
+    return np.asarray(np.degrees(np.arctan2(across, np.sum(up_estimate * up_truth, axis=1))))
+
+
+def yaw_errors(pair: Pair) -> np.ndarray:
+    """[deg] estimated minus true heading after aligning yaw and position, positive to the left."""
+    difference = _heading(aligned_yaw(pair)) - _heading(pair.truth)
+    return np.asarray(np.degrees(np.arctan2(np.sin(difference), np.cos(difference))))
+
+
+def _heading(trajectory: Trajectory) -> np.ndarray:
+    forward = rotation_matrix(trajectory.poses.quaternion) @ _FORWARD_OURS
+    return np.asarray(np.arctan2(-forward[:, 0], -forward[:, 2]))
+
+
 def errors_of(pair: Pair, per_scan: bool) -> dict[str, Any]:
     """All figures of one estimate, in metres and degrees."""
     full, is_full = aligned_se3(pair)
     absolute = position_errors(full, pair.truth)
     yaw_only = position_errors(aligned_yaw(pair), pair.truth)
-    rpe = relative_errors(pair, metrics.PoseRelation.translation_part, RPE_DELTA_M, metrics.Unit.meters)
     end = position_errors(aligned_at_start(pair), pair.truth)[-1]
     length = pair.truth.path_length()
     figures: dict[str, Any] = {
@@ -133,11 +152,15 @@ def errors_of(pair: Pair, per_scan: bool) -> dict[str, Any]:
         "ate_rmse_m": _rms(absolute),
         "ate_max_m": float(absolute.max()),
         "ate_yaw_rmse_m": _rms(yaw_only),
-        "rpe_10m_rmse_m": _rms(rpe) if rpe.size else None,
-        "rpe_10m_pairs": int(rpe.size),
         "end_error_m": float(end),
         "end_error_percent": 100.0 * float(end) / length if length > 0.0 else None,
     }
+    for delta in RPE_DELTAS_M:
+        rpe = relative_errors(pair, metrics.PoseRelation.translation_part, delta, metrics.Unit.meters)
+        figures |= {f"rpe_{delta}m_rmse_m": _rms(rpe) if rpe.size else None, f"rpe_{delta}m_pairs": int(rpe.size)}
+    tilt, yaw = tilt_errors(pair), yaw_errors(pair)
+    figures |= {"tilt_rmse_deg": _rms(tilt), "tilt_max_deg": float(tilt.max())}
+    figures |= {"yaw_rmse_deg": _rms(yaw), "yaw_max_deg": float(np.abs(yaw).max())}
     if per_scan:
         figures["per_scan"] = _per_scan(pair)
     return figures

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags made on the fly: a wall ahead, to the left and above, seen at rest, in each of the container formats."""
 
+import contextlib
+import sqlite3
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +10,7 @@ import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 START_NS = 1_700_000_000_000_000_000
 CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -98,4 +100,47 @@ def write_bag(folder: Path, form: str, topics: dict[str, str], **options: Any) -
                 entries.append((ns, connection, messages.raw(body, name)))
         for ns, connection, raw in sorted(entries, key=lambda entry: entry[0]):
             writer.write(connection, ns, raw)
+    return path
+
+
+_LIVOX_POINT = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line\n"
+_LIVOX_CLOUD = """std_msgs/Header header
+uint64 timebase
+uint32 point_num
+uint8 lidar_id
+uint8[3] rsvd
+{package}/CustomPoint[] points
+"""
+
+
+def write_livox_bag(folder: Path, form: str, package: str) -> Path:
+    """The same scene from a Livox driver, an sqlite3 bag without its definitions, as before ROS 2 Iron."""
+    messages = Messages(ros1=False)
+    point, cloud = f"{package}/msg/CustomPoint", f"{package}/msg/CustomMsg"
+    messages.store.register(get_types_from_msg(_LIVOX_POINT, point))
+    messages.store.register(get_types_from_msg(_LIVOX_CLOUD.format(package=package), cloud))
+    plugin = StoragePlugin.MCAP if form == "mcap" else StoragePlugin.SQLITE3
+    path = folder / f"livox_{form}"
+    with Writer2(path, version=8, storage_plugin=plugin) as writer:
+        clouds = writer.add_connection("/livox/lidar", cloud, typestore=messages.store)
+        samples = writer.add_connection("/livox/imu", IMU, typestore=messages.store)
+        entries = []
+        for index in range(5):
+            ns = START_NS + index * 100_000_000
+            points = [
+                messages.make(point, offset_time=int(t), x=x, y=y, z=z, reflectivity=9, tag=0, line=0)
+                for (x, y, z), t in zip(POINTS.tolist(), OFFSETS_NS, strict=True)
+            ]
+            values = {"timebase": 7, "point_num": len(points), "lidar_id": 0, "points": points}
+            message = messages.make(cloud, header=messages.header(ns), rsvd=np.zeros(3, dtype=np.uint8), **values)
+            entries.append((ns, clouds, messages.raw(message, cloud)))
+        entries += [
+            (ns, samples, messages.raw(messages.imu(ns), IMU)) for ns in range(START_NS, START_NS + 500_000_000, 10**7)
+        ]
+        for ns, connection, raw in sorted(entries, key=lambda entry: entry[0]):
+            writer.write(connection, ns, raw)
+    if form == "ros2":
+        (file,) = path.glob("*.db3")
+        with contextlib.closing(sqlite3.connect(file)) as database, database:
+            database.execute("DELETE FROM message_definitions")
     return path

@@ -10,7 +10,7 @@ import pytest
 from ignis.compare import comparison, main
 from ignis.errors import InputError
 from ignis.mounts import R_OURS_FROM_FLU, rotation_from_yaw_pitch_roll
-from ignis.poses import Poses, Trajectory, quaternion_from_matrix, write_tum
+from ignis.poses import Poses, Trajectory, quaternion_from_matrix, quaternion_product, write_tum
 
 
 def circle(count: int = 400, radius: float = 20.0) -> Trajectory:
@@ -122,7 +122,9 @@ def test_without_ground_truth_the_two_are_compared_with_each_other(tmp_path: Pat
     assert main([str(folder_with(tmp_path / "r", eskf, smoothed, None))]) == 0
     said = capsys.readouterr().out
     assert "no ground truth" in said and "largest 0.500 m" in said
-    result = json.loads((tmp_path / "r" / "compare.json").read_text())
+    content = json.loads((tmp_path / "r" / "compare.json").read_text())
+    assert content["smoothing"]["words"] == ["Without ground truth nobody can say whether smoothing helped."]
+    (result,) = content["runs"]
     assert result["ground_truth"] is False
     assert result["smoothed_minus_eskf"]["rmse_m"] == pytest.approx(0.5)
     assert result["trajectories"]["eskf"]["end_to_start_m"] == pytest.approx(0.0, abs=1e-6)
@@ -135,7 +137,7 @@ def test_the_table_shows_what_compare_json_holds(tmp_path: Path, capsys) -> None
     folder = folder_with(tmp_path / "r", with_positions(truth, truth.poses.position * 1.01), truth, truth)
     assert main([str(folder), "--per-scan"]) == 0
     said = capsys.readouterr().out
-    figures = json.loads((folder / "compare.json").read_text())["trajectories"]["eskf"]
+    figures = json.loads((folder / "compare.json").read_text())["runs"][0]["trajectories"]["eskf"]
     assert f"{figures['ate_rmse_m']:.3f}" in said and "per scan, p95" in said
     assert (folder / "error.png").stat().st_size > 1000
     assert not list(folder.glob("*.tmp"))
@@ -150,3 +152,58 @@ def test_missing_files_foreign_truth_and_unrelated_runs_are_refused(tmp_path: Pa
         comparison(folder_with(tmp_path / "a", truth, truth, late))
     with pytest.raises(InputError, match="same run"):
         comparison(folder_with(tmp_path / "b", truth, late, None))
+
+
+def test_several_runs_are_one_table_with_the_mean_and_an_interval(tmp_path: Path, capsys) -> None:
+    truth = circle()
+    folders = []
+    for seed, scale in enumerate((1.010, 1.012, 1.008, 1.011)):
+        eskf = with_positions(truth, truth.poses.position * scale)
+        smoothed = with_positions(truth, truth.poses.position * (1.0 + (scale - 1.0) / 2))
+        folders.append(str(folder_with(tmp_path / f"seed{seed}", eskf, smoothed, truth)))
+    assert main([*folders, "--out", str(tmp_path / "all")]) == 0
+    said = capsys.readouterr().out
+    assert "seed3" in said and "mean" in said and "Smoothing helped. ATE" in said
+    content = json.loads((tmp_path / "all" / "compare.json").read_text())
+    gain = content["smoothing"]["gains"]["ate_rmse_m"]
+    # Half of 1.025 % of the radius of 20 m, and drives that differ little.
+    assert gain["gain_mean"] == pytest.approx(0.1025, rel=0.01)
+    assert 0.08 < gain["interval"][0] < gain["gain_mean"] < gain["interval"][1] < 0.12
+    page = (tmp_path / "all" / "compare.html").read_text()
+    assert page.count("<svg") >= 4 + 4 * 3 and "seed2" in page
+
+
+def test_another_estimate_stands_beside_ours(tmp_path: Path, capsys) -> None:
+    truth = circle()
+    folder = folder_with(tmp_path / "r", truth, truth, truth)
+    write_tum(tmp_path / "peer.tum", with_positions(truth, truth.poses.position * 1.02))
+    assert main([str(folder), "--against", str(tmp_path / "peer.tum")]) == 0
+    assert "peer" in capsys.readouterr().out
+    (result,) = json.loads((folder / "compare.json").read_text())["runs"]
+    assert result["trajectories"]["peer"]["ate_rmse_m"] == pytest.approx(0.4, rel=0.01)
+    (folder / "ground_truth.tum").unlink()
+    assert main([str(folder), "--against", str(tmp_path / "peer.tum")]) == 0
+    (blind,) = json.loads((folder / "compare.json").read_text())["runs"]
+    assert blind["trajectories"]["peer"]["distance_from_smoothed"]["rmse_m"] == pytest.approx(0.4, rel=0.01)
+    assert main([str(folder), str(folder), "--against", str(tmp_path / "peer.tum")]) == 2
+
+
+def test_tilt_and_yaw_are_what_was_put_in(tmp_path: Path) -> None:
+    truth = circle()
+    # Tilted by 1 degree at every pose about its own right axis; heading off by 2 degrees for the second half only.
+    nodding = quaternion_from_matrix(rotation_from_yaw_pitch_roll(0.0, np.radians(1.0), 0.0))
+    tilted = Trajectory(
+        truth.utime,
+        Poses(truth.poses.position, quaternion_product(truth.poses.quaternion, np.tile(nodding, (len(truth), 1)))),
+    )
+    turned = truth.poses.quaternion.copy()
+    turned[200:] = quaternion_product(
+        np.tile(quaternion_from_matrix(rotation_from_yaw_pitch_roll(np.radians(2.0), 0.0, 0.0)), (200, 1)), turned[200:]
+    )
+    yawed = Trajectory(truth.utime, Poses(truth.poses.position, turned))
+    figures = comparison(folder_with(tmp_path / "r", tilted, yawed, truth))["trajectories"]
+    assert figures["eskf"]["tilt_rmse_deg"] == pytest.approx(1.0, abs=1e-6)
+    assert figures["eskf"]["yaw_rmse_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert figures["smoothed"]["tilt_rmse_deg"] == pytest.approx(0.0, abs=1e-5)
+    assert figures["smoothed"]["yaw_rmse_deg"] == pytest.approx(2.0 / np.sqrt(2.0), abs=1e-6)
+    assert figures["smoothed"]["yaw_max_deg"] == pytest.approx(2.0, abs=1e-6)

@@ -94,3 +94,29 @@ def test_the_decision_about_times_is_told(tmp_path: Path, level_config: Path, ca
     bag = bags.write_bag(tmp_path, "ros2", BOTH, time_name="offset_time")
     assert main([str(bag), "-o", str(tmp_path / "x.lcmlog"), "--config", str(level_config)]) == 0
     assert "per-point time: field offset_time, ns, relative to the header's stamp" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("package", ["livox_ros_driver", "livox_ros_driver2"])
+@pytest.mark.parametrize("form", ["ros2", "mcap"])
+def test_livox_bags_come_in_without_their_definitions(
+    package: str, form: str, tmp_path: Path, level_config: Path, capsys
+) -> None:
+    bag = bags.write_livox_bag(tmp_path, form, package)
+    assert main([str(bag), "-o", str(tmp_path / "x.lcmlog"), "--config", str(level_config)]) == 0
+    assert "per-point time: field offset_time, ns" in capsys.readouterr().out
+    scans = [e.message for e in read_log(tmp_path / "x.lcmlog", ("L1_SCAN",))]
+    assert [s.utime for s in scans] == [START_US + i * 100_000 for i in range(5)]
+    np.testing.assert_allclose(np.array(scans[0].x), -bags.POINTS[:, 1])
+    assert list(scans[0].dt_us) == [0, 30_000, 60_000, 90_000]
+
+
+def test_clouds_without_times_come_in_when_nobody_wants_deskewing(tmp_path: Path, level_config: Path, capsys) -> None:
+    bag = bags.write_bag(tmp_path, "ros2", BOTH, time_name=None)
+    arguments = [str(bag), "-o", str(tmp_path / "x.lcmlog"), "--config", str(level_config)]
+    assert main(arguments) == 2
+    assert "--no-deskew imports them all the same" in capsys.readouterr().err
+    assert main([*arguments, "--no-deskew"]) == 0
+    assert "no per-point time: every point has its cloud's stamp" in capsys.readouterr().out
+    scans = [e.message for e in read_log(tmp_path / "x.lcmlog", ("L1_SCAN",))]
+    assert [s.utime for s in scans] == [START_US + i * 100_000 for i in range(5)]
+    assert {s.duration_us for s in scans} == {0}

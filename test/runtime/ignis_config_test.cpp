@@ -16,7 +16,7 @@ std::string content(const std::filesystem::path& file) {
 }
 
 TEST(IgnisConfig, EveryShippedFileIsAccepted) {
-  for (const char* name : {"ignis8.json", "ignis8_tuned.json", "kitti.json", "spinning.json"}) {
+  for (const char* name : {"ignis8.json", "ignis8_tuned.json", "kitti.json", "ouster.json", "spinning.json"}) {
     EXPECT_NO_THROW((void)load_config(kFolder / name)) << name;
   }
 }

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The systems of a benchmark, ours and the peers, each as a process of its own on the same core."""
 
-import hashlib
 import json
 import os
 import resource
 import signal
 import subprocess
 import tempfile
-import venv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ignis import trajectory_error
 from ignis.benching.inputs import Drive
+from ignis.environments import environment_python
 from ignis.errors import InputError
 from ignis.poses import Trajectory, read_tum
 
@@ -35,23 +34,7 @@ class Outcome:
 
 def peers_python(requirements: Path, cache: Path) -> Path:
     """The Python of the peers' environment, made once per list of versions."""
-    digest = hashlib.sha256(requirements.read_bytes()).hexdigest()[:12]
-    folder = cache / f"peers-{digest}"
-    python = folder / "bin" / "python3"
-    if (folder / "ready").exists():
-        return python
-    print("bench: installing the peers into an environment of their own (once)", flush=True)
-    venv.create(folder, with_pip=True, clear=True)
-    done = subprocess.run(
-        [python, "-m", "pip", "install", "--quiet", "--requirement", requirements],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode != 0:
-        raise InputError(f"the peers could not be installed: {done.stderr.strip().splitlines()[-1]}")
-    (folder / "ready").touch()
-    return python
+    return environment_python("peers", requirements, cache)
 
 
 def run_ours(lio_replay: Path, drive: Drive, config: Path, out: Path, core: int) -> list[Outcome]:

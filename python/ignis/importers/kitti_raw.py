@@ -111,7 +111,8 @@ def lidar_mount(calibration: Path) -> Mount:
     r_turn = R_OURS_FROM_FLU @ r_velo_imu.T @ R_OURS_FROM_FLU.T
     translation = R_OURS_FROM_FLU @ (-r_velo_imu.T @ t_velo_imu)
     yaw, pitch, roll = np.degrees(yaw_pitch_roll_from_rotation(r_turn))
-    return Mount("forward_left_up", float(yaw), float(pitch), float(roll), tuple(float(v) for v in translation))
+    x, y, z = (float(value) for value in translation)
+    return Mount("forward_left_up", float(yaw), float(pitch), float(roll), (x, y, z))
 
 
 def _mount_remarks(drive: Path, extrinsics: Extrinsics) -> list[str]:

@@ -48,7 +48,7 @@ def import_capture(path: Path, config: Path, output: Path) -> list[str]:
 
 def _write_in_order(decoded: Path, output: Path, source: Path) -> list[str]:
     damage = LogDamage()
-    records = []
+    records: list[tuple[int, int, str, bytes]] = []
     for event in read_log(decoded, damage=damage):
         complete = event.message.utime + getattr(event.message, "duration_us", 0)
         records.append((complete, len(records), event.channel, event.message.encode()))

@@ -24,12 +24,14 @@ _SHORTEST, _LONGEST = 0.02, 3.0
 class PointTimes:
     """The decision for one topic."""
 
-    field: str
+    field: str  # empty: none, every point has the stamp of its cloud
     unit: str
     absolute: bool
 
     def describe(self) -> str:
         """The decision in words."""
+        if not self.field:
+            return "no per-point time: every point has its cloud's stamp (--no-deskew); motion blurs the clouds"
         origin = "absolute" if self.absolute else "relative to the header's stamp"
         return f"per-point time: field {self.field}, {self.unit}, {origin}"
 
@@ -40,6 +42,9 @@ class PointTimes:
         else:
             nanoseconds = np.rint(values.astype(np.float64) * (SECONDS_PER_UNIT[self.unit] * 1e9)).astype(np.int64)
         return (nanoseconds if self.absolute else nanoseconds + header_ns) // 1000
+
+
+WITHOUT = PointTimes("", "ns", absolute=False)
 
 
 def time_field(names: list[str]) -> str | None:

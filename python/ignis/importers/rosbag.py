@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from ignis.errors import InputError
 from ignis.importers.point_clouds import RawCloud, from_livox, from_point_cloud2, stamp_ns
-from ignis.importers.point_times import PointTimes, decide
+from ignis.importers.point_times import WITHOUT, PointTimes, decide
 from ignis.importers.recorder import Recorder
 from ignis.progress import Progress
 
@@ -20,6 +21,13 @@ _IMU_TYPE = "sensor_msgs/msg/Imu"
 _CLOUD_TYPE = "sensor_msgs/msg/PointCloud2"
 _LIVOX_SUFFIX = "/CustomMsg"
 _STANDARD_GRAVITY = 9.80665
+# Bags of ROS 2 before Iron carry no definitions of their types; both generations of Livox drivers use these.
+_LIVOX_PACKAGES = ("livox_ros_driver", "livox_ros_driver2", "livox_interfaces")
+_LIVOX_POINT = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line\n"
+_LIVOX_CLOUD = (
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
+    "{package}/CustomPoint[] points\n"
+)
 # How many messages of each kind the decisions about units rest on.
 _PROBE_CLOUDS, _PROBE_IMU = 10, 200
 
@@ -31,12 +39,14 @@ def is_bag(path: Path) -> bool:
     return path.suffix in (".bag", ".mcap", ".db3")
 
 
-def import_bag(path: Path, recorder: Recorder, cloud_topic: str | None, imu_topic: str | None) -> list[str]:
+def import_bag(
+    path: Path, recorder: Recorder, cloud_topic: str | None, imu_topic: str | None, no_deskew: bool = False
+) -> list[str]:
     """Hands one bag to the recorder; returns remarks for the user."""
     with _opened(path) as reader:
         cloud = _choose_topic(reader, cloud_topic, "cloud", _is_cloud_type, path)
         imu = _choose_topic(reader, imu_topic, "imu", lambda name: name == _IMU_TYPE, path)
-        point_times, intensity_scale, intensity_text = _probe_clouds(reader, cloud)
+        point_times, intensity_scale, intensity_text = _probe_clouds(reader, cloud, no_deskew)
         accel_scale, accel_text = _probe_imu(reader, imu)
         progress = Progress(f"importing {path.name}")
         span = max(reader.duration, 1)
@@ -44,7 +54,7 @@ def import_bag(path: Path, recorder: Recorder, cloud_topic: str | None, imu_topi
             if topic == imu:
                 recorder.add_imu(*_imu_sample(message, accel_scale))
             else:
-                raw = _raw_cloud(message, cloud)
+                raw = _raw_cloud(message, cloud, no_deskew)
                 timed = np.isfinite(raw.times)
                 instants = point_times.utime(raw.times[timed], raw.header_ns)
                 recorder.add_scan(instants, raw.points[timed], raw.intensity[timed] * intensity_scale)
@@ -53,13 +63,21 @@ def import_bag(path: Path, recorder: Recorder, cloud_topic: str | None, imu_topi
     return [f"clouds from {cloud}, inertial data from {imu}", point_times.describe(), intensity_text, accel_text]
 
 
+def _typestore() -> Typestore:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for package in _LIVOX_PACKAGES:
+        store.register(get_types_from_msg(_LIVOX_POINT, f"{package}/msg/CustomPoint"))
+        store.register(get_types_from_msg(_LIVOX_CLOUD.format(package=package), f"{package}/msg/CustomMsg"))
+    return store
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[AnyReader]:
     """Opens a bag; whatever the library finds wrong with it becomes one sentence."""
     if path.is_file() and path.suffix == ".db3" and (path.parent / "metadata.yaml").is_file():
         path = path.parent
     try:
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader = AnyReader([path], default_typestore=_typestore())
         reader.open()
     except (KeyboardInterrupt, InputError):
         raise
@@ -105,17 +123,19 @@ def _messages(reader: AnyReader, topics: tuple[str, ...]) -> Iterator[tuple[str,
         raise InputError(f"the bag is damaged: {error or type(error).__name__}") from None
 
 
-def _raw_cloud(message: Any, topic: str) -> RawCloud:
+def _raw_cloud(message: Any, topic: str, no_deskew: bool) -> RawCloud:
     try:
-        return from_livox(message) if hasattr(message, "point_num") else from_point_cloud2(message, topic)
+        if hasattr(message, "point_num"):
+            return from_livox(message, no_deskew)
+        return from_point_cloud2(message, topic, no_deskew)
     except (ValueError, LookupError, OverflowError) as error:
         raise InputError(f"a cloud of {topic} contradicts its own layout: {error}") from None
 
 
-def _probe_clouds(reader: AnyReader, topic: str) -> tuple[PointTimes, float, str]:
+def _probe_clouds(reader: AnyReader, topic: str, no_deskew: bool) -> tuple[PointTimes, float, str]:
     clouds: list[RawCloud] = []
     for _, _, message in _messages(reader, (topic,)):
-        cloud = _raw_cloud(message, topic)
+        cloud = _raw_cloud(message, topic, no_deskew)
         if len(cloud.points):
             clouds.append(cloud)
         if len(clouds) == _PROBE_CLOUDS:
@@ -123,7 +143,7 @@ def _probe_clouds(reader: AnyReader, topic: str) -> tuple[PointTimes, float, str
     if not clouds:
         raise InputError(f"all clouds of {topic} are empty")
     times = [(cloud.header_ns, cloud.times[np.isfinite(cloud.times)]) for cloud in clouds]
-    point_times = decide(clouds[0].time_name, times, topic)
+    point_times = WITHOUT if no_deskew else decide(clouds[0].time_name, times, topic)
     brightest = max(float(np.max(cloud.intensity, initial=0.0, where=np.isfinite(cloud.intensity))) for cloud in clouds)
     if 0.0 < brightest <= 1.0:
         return point_times, 255.0, "intensities are 0..1: multiplied by 255"

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay_input.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <gtest/gtest.h>
+#include <lcm/lcm-cpp.hpp>
+
+#include "ignis/imu_t.hpp"
+#include "ignis/pose_t.hpp"
+#include "ignis/scan_t.hpp"
+#include "test_folder.h"
+
+namespace ignis {
+namespace {
+
+class ReplayInputTest : public testing::Test {
+ protected:
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void write(const std::string& channel, std::vector<unsigned char> data) {
+    lcm::LogEvent event;
+    event.eventnum = number_++;
+    event.timestamp = 1'000 * number_;
+    event.channel = channel;
+    event.datalen = static_cast<int>(data.size());
+    event.data = data.data();
+    ASSERT_EQ(writer_->writeEvent(&event), 0);
+  }
+
+  template <class Message>
+  void write_message(const std::string& channel, const Message& message) {
+    std::vector<unsigned char> data(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(data.data(), 0, static_cast<int>(data.size()));
+    write(channel, std::move(data));
+  }
+
+  void write_imu(int index) {
+    imu_t message{};
+    message.utime = 4'000 * index;
+    message.sequence = index;
+    write_message("L1_IMU", message);
+  }
+
+  void write_scan(int index) {
+    scan_t message{};
+    message.utime = 50'000 * index;
+    message.sequence = index;
+    message.part_count = 1;
+    write_message("L1_SCAN", message);
+  }
+
+  ReplayInput opened() {
+    writer_.reset();  // flushes
+    return ReplayInput(file_);
+  }
+
+  std::filesystem::path folder_ = test::fresh_folder();
+  std::filesystem::path file_ = folder_ / "test.lcmlog";
+  std::unique_ptr<lcm::LogFile> writer_ = std::make_unique<lcm::LogFile>(file_.string(), "w");
+  int number_ = 0;
+};
+
+TEST_F(ReplayInputTest, ListsAForeignLogWhenItRefusesIt) {
+  for (int i = 0; i < 3; ++i) write("POSE_BODY", {0x12, 0x34, 0x56, 0x78, 0x9a, 0xbc, 0xde, 0xf0, 1, 2, 3});
+  write("L1_IMU", {1, 2, 3, 4, 5, 6, 7, 8, 9});  // our channel, somebody else's type
+  write_message("GROUND_TRUTH", pose_t{});
+  try {
+    (void)opened();
+    FAIL() << "a log without measurements was accepted";
+  } catch (const std::runtime_error& error) {
+    const std::string text = error.what();
+    for (const char* part : {"no usable message on L1_IMU", "POSE_BODY", "3 messages", "0x123456789abcdef0",
+                             "none of ours", "GROUND_TRUTH", "pose_t"}) {
+      EXPECT_NE(text.find(part), std::string::npos) << part << " in:\n" << text;
+    }
+  }
+}
+
+TEST_F(ReplayInputTest, HandsOutInOrderOfStampsWhateverTheOrderOfRecords) {
+  for (const int i : {0, 2, 1, 30, 4, 3}) write_imu(i);
+  for (const int i : {1, 0, 2}) write_scan(i);
+  const ReplayInput input = opened();
+  std::vector<Utime> stamps;
+  input.run([&](const ImuSample& sample) { stamps.push_back(sample.utime); },
+            [&](const Scan& scan) { stamps.push_back(scan.utime); }, [](Utime) { return true; });
+  EXPECT_EQ(stamps.size(), 9U);
+  EXPECT_TRUE(std::ranges::is_sorted(stamps));
+  EXPECT_EQ(input.inventory().out_of_order, 4);  // 1, 4 and 3 of the IMU, 0 of the scans
+}
+
+TEST_F(ReplayInputTest, NamesTheFirstOfAllGaps) {
+  for (int i = 0; i < 50; ++i) {
+    if (i != 40 && i != 41) write_imu(i);  // 164,000 us is the first behind
+  }
+  for (const int i : {0, 1, 3, 4, 6}) write_scan(i);  // 150,000 us
+  const ReplayInput input = opened();
+  EXPECT_EQ(input.inventory().missing_imu, 2);
+  EXPECT_EQ(input.inventory().missing_scans, 2);
+  ASSERT_TRUE(input.inventory().first_drop);
+  EXPECT_EQ(input.inventory().first_drop->utime, 150'000);
+  EXPECT_EQ(input.inventory().first_drop->what, "1 of L1_SCAN missing in the log");
+}
+
+TEST_F(ReplayInputTest, KnowsNoDropInAWholeLog) {
+  for (int i = 0; i < 50; ++i) write_imu(i);
+  for (int i = 0; i < 4; ++i) write_scan(i);
+  EXPECT_FALSE(opened().inventory().first_drop);
+}
+
+}  // namespace
+}  // namespace ignis
