@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A browser in a network of its own."""
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, sync_playwright
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from view_page import launch
 

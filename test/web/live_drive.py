@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from bus_listener import BusListener
 from playwright.sync_api import Browser
-from view_page import ViewPage
 
+from bus_listener import BusListener
 from ignis.pipeline import Pipeline, effective_config
+from view_page import ViewPage
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"

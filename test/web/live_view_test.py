@@ -5,9 +5,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from live_drive import LiveDrive
 from matplotlib.image import imread
 from playwright.sync_api import Browser
+
+from live_drive import LiveDrive
 from view_page import ViewPage
 
 

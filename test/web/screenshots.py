@@ -19,9 +19,9 @@ from pathlib import Path
 
 from PIL import Image
 from playwright.sync_api import sync_playwright
-from view_page import ViewPage, launch
 
 from ignis.pipeline import Pipeline, effective_config, enter_private_network
+from view_page import ViewPage, launch
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 PORT = 18099
