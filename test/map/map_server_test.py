@@ -29,7 +29,9 @@ def server(start_server):
 def test_page_and_its_files_come_from_the_table(server):
     status, head, body = server.request("/")
     assert status == 200 and "text/html" in head and b"<canvas" in body
-    for name in set(re.findall(r'(?:src|href)="([\w.]+)"', body.decode())):
+    names = set(re.findall(r'(?:src|href)="\./([\w.-]+)"', body.decode()))
+    assert {"view.js", "view.css", "icon.svg"} <= names
+    for name in names:
         status, head, content = server.request("/" + name)
         assert status == 200 and len(content) > 100, name
     assert server.request("/view.js")[1].count("text/javascript") == 1
