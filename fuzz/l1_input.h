@@ -2,9 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "drivers/mavlink_frame.h"
+#include "require.h"
 
 /// How the fuzz targets of the L1 read their inputs: as the raw stream, or as a list of payloads that get valid headers
 /// and checksums, since nothing behind the checksum is ever reached by chance.
@@ -61,11 +61,6 @@ inline std::vector<std::byte> next_read(Input& input, bool as_frame) {
   if (as_frame) return framed(input);
   const auto raw = input.take(1 + input.byte());
   return {raw.begin(), raw.end()};
-}
-
-/// Ends the program when the code under test broke its word.
-inline void require(bool promise) {
-  if (!promise) std::abort();
 }
 
 }  // namespace ignis::fuzz

@@ -5,17 +5,25 @@
 
 #include <nlohmann/json.hpp>
 
+#include "map/voxel_checksum.h"
+#include "map_builder/stream_counters.h"
+
 namespace ignis {
 namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
+Json vector_json(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
 Json state_json(const HudData& data) {
   const state_t& state = data.state;
+  const Eigen::Quaterniond& q = data.T_map_body.rotation;
   return {{"utime", state.utime},
           {"session", state.session},
           {"age_s", data.state_age_s},
+          {"position", vector_json(data.T_map_body.translation)},
+          {"quaternion", {q.w(), q.x(), q.y(), q.z()}},
           {"yaw_deg", state.yaw * kDegrees},
           {"pitch_deg", state.pitch * kDegrees},
           {"roll_deg", state.roll * kDegrees},
@@ -62,6 +70,63 @@ Json map_json(const HudData& data) {
           {"bands_m", data.band_radii}};
 }
 
+Json processes_json(const HudData& data) {
+  Json list = Json::array();
+  for (const ProcessTable::Row& row : data.processes) {
+    list.push_back({{"process", row.process}, {"state", row.state}, {"reason", row.reason}});
+  }
+  return list;
+}
+
+Json link_json(const HudData& data) {
+  return {{"lost", data.messages_lost},
+          {"received", data.messages_received},
+          {"age_s", data.has_state ? Json(data.state_age_s) : Json()}};
+}
+
+Json duration_json(const DurationStats& stats) {
+  return {
+      {"count", stats.count()}, {"median", stats.quantile(0.5)}, {"p99", stats.quantile(0.99)}, {"max", stats.max()}};
+}
+
+Json budget_json(const MapBudget& budget) {
+  return {{"voxel_bytes", budget.voxel_bytes},
+          {"cloud_bytes", budget.cloud_bytes},
+          {"insertion_ms", duration_json(budget.insertion)},
+          {"snapshot_ms", duration_json(budget.picture)},
+          {"rebuild_ms", duration_json(budget.rebuild)}};
+}
+
+Json views_json(const std::map<double, SharedPicture>& pictures) {
+  Json list = Json::array();
+  for (const auto& [radius, picture] : pictures) {
+    list.push_back({{"radius", radius},
+                    {"revision", picture->revision},
+                    {"counts", picture->counts},
+                    {"checksum", checksum_text(picture->checksum)},
+                    {"utime", picture->utime}});
+  }
+  return list;
+}
+
+Json stream_json(const StreamCounters& counters) {
+  Json json{{"snapshots", counters.snapshots.load()},
+            {"deltas", counters.deltas.load()},
+            {"frame_bytes", counters.frame_bytes.load()},
+            {"pictures_skipped", counters.pictures_skipped.load()},
+            {"resyncs", counters.resyncs.load()}};
+  json["refused"] = {{"bad_requests", counters.bad_requests.load()},
+                     {"protocol_errors", counters.protocol_errors.load()},
+                     {"binary_messages", counters.binary_messages.load()},
+                     {"invalid_texts", counters.invalid_texts.load()},
+                     {"policy_closes", counters.policy_closes.load()},
+                     {"oversized", counters.oversized.load()},
+                     {"idle_closes", counters.idle_closes.load()},
+                     {"upgrades", counters.refused_upgrades.load()},
+                     {"http", counters.refused_http.load()}};
+  return json;
+}
+
 std::string text_of(const Json& json) {
   // A text from the bus may hold anything; broken UTF-8 is replaced, since browsers close the socket on it.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -74,13 +139,23 @@ std::string hud_json(const HudData& data) {
   json["state"] = data.has_state ? state_json(data) : Json();
   json["scan"] = data.has_scan ? scan_json(data) : Json();
   json["loop"] = data.has_loop ? loop_json(data) : Json();
+  json["health"] = processes_json(data);
+  json["link"] = link_json(data);
   return text_of(json);
 }
 
-std::string status_json(const HudData& data) {
+std::string status_json(const HudData& data, const MapBudget& budget, const StreamCounters& counters,
+                        const std::map<double, SharedPicture>& pictures, const std::string& loops) {
   Json json = map_json(data);
   json["address"] = data.map.address;
   json["utime"] = data.map.utime;
+  json["session"] = data.state.session;
+  json["views"] = views_json(pictures);
+  json["budget"] = budget_json(budget);
+  json["stream"] = stream_json(counters);
+  json["loops"] = Json::parse(loops)["list"];
+  json["processes"] = processes_json(data);
+  json["link"] = link_json(data);
   return text_of(json) + '\n';
 }
 

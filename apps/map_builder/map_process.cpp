@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map_builder/map_process.h"
 
+#include <algorithm>
 #include <format>
+#include <utility>
 
+#include <nlohmann/json.hpp>
+
+#include "ignis/graph_command_t.hpp"
 #include "ignis/keyframe_request_t.hpp"
-#include "map/stream_encoding.h"
+#include "map_builder/loop_clouds.h"
 #include "runtime/channels.h"
 #include "runtime/stop_signal.h"
 
@@ -19,14 +24,39 @@ constexpr std::chrono::seconds kReportPeriod{1};
 constexpr std::size_t kMaxRequestedIds = 32;
 constexpr int kMaxRequests = 5;  // the front end keeps a ring: what it no longer has will never come
 
+// Complete paths are sent whenever they change, so a long drive's are sent less often.
+constexpr double kPathBytesPerSecond = 40'000.0;
+constexpr double kPathPointBytes = 12.0;
+constexpr std::chrono::milliseconds kMinPathPeriod{300};
+constexpr int kHealthQueue = 100;
+
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+/// Runs `work` and adds the wall time that it took.
+template <class Work>
+auto timed(DurationStats& stats, Work&& work) {
+  const auto began = std::chrono::steady_clock::now();
+  auto result = work();
+  stats.add(1e3 * seconds(std::chrono::steady_clock::now() - began));
+  return result;
+}
+
+SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
+
+StreamTerms stream_terms(const MapConfig& map, const runtime::HmiConfig& hmi) {
+  return {.server_version = runtime::version(),
+          .cell_m = {map.local_cell_m, map.mid_cell_m, map.coarse_cell_m},
+          .window_m = {map.local_window_m, map.mid_window_m, map.coarse_window_m},
+          .max_view_radius_m = hmi.max_view_radius_m,
+          .frame_rate_hz = hmi.frame_rate_hz};
+}
 
 }  // namespace
 
 MapProcess::MapProcess(const runtime::Application& application, const runtime::HmiConfig& hmi)
     : map_config_(application.config.map),
       link_(application),
-      server_(hmi),
+      server_(hmi, stream_terms(map_config_, hmi)),
       map_(map_config_),
       frame_period_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))) {
@@ -51,16 +81,13 @@ void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
                                                  }));
   remember(link_.subscribe<loop_result_t>(channels::kLoopResult, lcm.keyframe_queue,
                                           [this](const loop_result_t& message) { on_loop(message); }));
-  remember(link_.subscribe<scan_stats_t>(channels::kScanStats, lcm.cloud_queue, [this](const scan_stats_t& message) {
-    hud_.scan = message;
-    hud_.has_scan = true;
-    ++(message.applied != 0 ? hud_.scans_applied : hud_.scans_rejected);
-  }));
-  remember(link_.subscribe<state_t>(channels::kState, lcm.state_queue, [this](const state_t& message) {
-    hud_.state = message;
-    hud_.has_state = true;
-    last_state_ = Clock::now();
-  }));
+  remember(link_.subscribe<scan_stats_t>(channels::kScanStats, lcm.cloud_queue,
+                                         [this](const scan_stats_t& message) { on_scan_stats(message); }));
+  remember(link_.subscribe<state_t>(channels::kState, lcm.state_queue,
+                                    [this](const state_t& message) { on_state(message); }));
+  remember(link_.subscribe<health_t>(
+      channels::kHealth, kHealthQueue, [this](const health_t& message) { on_health(message); },
+      runtime::Senders::kSeveral));
 }
 
 bool MapProcess::accept_session(std::int32_t session) {
@@ -68,13 +95,15 @@ bool MapProcess::accept_session(std::int32_t session) {
   if (session_ && session > *session_) {
     // A new odom frame: nothing of the old map can be placed in it.
     map_.clear();
+    loops_.clear();
     graph_keyframes_ = 0;
     request_counts_.clear();
     hud_.loops_accepted = 0;
     hud_.loops_withdrawn = 0;
-    if (rebuild_.valid()) rebuild_ = {};
     ++resets_;
-    map_changed_ = true;
+    map_changed_ = loops_changed_ = keyframes_changed_ = true;
+    next_paths_ = {};
+    events_.session(hud_.map.utime, session);
   }
   session_ = session;
   return true;
@@ -82,7 +111,8 @@ bool MapProcess::accept_session(std::int32_t session) {
 
 void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
   if (!accept_session(cloud.session)) return;
-  const InsertCounts counts = map_.insert_scan(cloud.points, cloud.T_odom_body);
+  const InsertCounts counts =
+      timed(budget_.insertion, [&] { return map_.insert_scan(cloud.points, cloud.T_odom_body); });
   if (!cloud.points.empty() && counts.rejected == cloud.points.size()) {
     ++refused_clouds_;
     return;
@@ -93,7 +123,10 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
 }
 
 void MapProcess::on_keyframe(const Keyframe& keyframe) {
-  if (accept_session(keyframe.session) && map_.add_keyframe(keyframe)) map_changed_ = true;
+  if (!accept_session(keyframe.session) || map_.clouds().contains(keyframe.id)) return;
+  if (!map_.add_keyframe(keyframe)) return;
+  events_.keyframe(keyframe.state.utime, keyframe.id);
+  map_changed_ = keyframes_changed_ = true;
 }
 
 void MapProcess::on_revision(const messages::GraphRevision& revision) {
@@ -101,24 +134,44 @@ void MapProcess::on_revision(const messages::GraphRevision& revision) {
   std::vector<CorrectedPose> poses;
   poses.reserve(revision.poses.size());
   for (const KeyframePose& pose : revision.poses) poses.push_back({pose.id, pose.T_map_body});
-  map_.correct(revision.T_map_odom, poses);
-  hud_.map.revision = revision.revision;
+  map_.correct(revision.T_map_odom, poses, revision.revision);
   graph_keyframes_ = revision.keyframes;
-  map_changed_ = true;
+  map_changed_ = keyframes_changed_ = true;
 }
 
 void MapProcess::on_loop(const loop_result_t& loop) {
   if (!accept_session(loop.session)) return;
   hud_.loop = loop;
   hud_.has_loop = true;
+  loops_changed_ |= loops_.record(loop);
   if (loop.accepted != 0) {
     ++hud_.loops_accepted;
     map_.add_loop(loop.from_id, loop.to_id);
-  } else if (loop.reason == loop_result_t::WITHDRAWN) {
+  } else if (loop.reason == loop_result_t::WITHDRAWN || loop.stage == loop_result_t::STAGE_WITHDRAWN) {
     ++hud_.loops_withdrawn;
     map_.remove_loop(loop.from_id, loop.to_id);
   }
+  events_.loop(loop);
   map_changed_ = true;
+  next_paths_ = {};  // the way driven is about to move
+}
+
+void MapProcess::on_scan_stats(const scan_stats_t& scan) {
+  hud_.scan = scan;
+  hud_.has_scan = true;
+  ++(scan.applied != 0 ? hud_.scans_applied : hud_.scans_rejected);
+  events_.scan(scan);
+}
+
+void MapProcess::on_state(const state_t& state) {
+  hud_.state = state;
+  hud_.has_state = true;
+  hud_.T_map_body = map_.T_map_odom() * messages::from_message(state).T_odom_body;
+  last_state_ = Clock::now();
+}
+
+void MapProcess::on_health(const health_t& health) {
+  if (const auto change = processes_.record(health, Clock::now())) events_.process(hud_.map.utime, *change);
 }
 
 void MapProcess::run() {
@@ -133,12 +186,13 @@ void MapProcess::run() {
     }
     const auto now = Clock::now();
     start_or_finish_rebuild();
+    answer_viewers();
     if (now >= next_frame) {
-      next_frame = now + frame_period_;
-      send_frames();
+      next_frame = std::max(next_frame + frame_period_, now);
+      make_pictures();
     }
     if (now >= next_hud) {
-      next_hud = now + kHudPeriod;
+      next_hud = std::max(next_hud + kHudPeriod, now);
       send_hud();
     }
     if (now >= next_report) {
@@ -153,71 +207,162 @@ void MapProcess::start_or_finish_rebuild() {
   if (rebuild_.valid()) {
     if (rebuild_.wait_for(milliseconds(0)) != std::future_status::ready) return;
     Rebuilt rebuilt = rebuild_.get();
-    hud_.map.last_rebuild_ms = rebuilt.milliseconds;
-    map_.finish_rebuild(std::move(rebuilt.map));
-    map_changed_ = true;
+    // After a new session there is nothing left that this map shows.
+    if (map_.rebuilding()) {
+      hud_.map.last_rebuild_ms = rebuilt.milliseconds;
+      budget_.rebuild.add(rebuilt.milliseconds);
+      events_.rebuild(hud_.map.utime, rebuilt.keyframes, rebuilt.milliseconds);
+      map_.finish_rebuild(std::move(rebuilt.map));
+      map_changed_ = true;
+      next_paths_ = {};
+    }
   }
   if (!map_.needs_rebuild()) return;
   rebuild_ = std::async(std::launch::async, [job = map_.begin_rebuild()] {
     const auto began = Clock::now();
     ThreeLevelMap built = rebuild(job);
-    return Rebuilt{std::move(built), 1000.0 * seconds(Clock::now() - began)};
+    return Rebuilt{std::move(built), static_cast<int>(job.clouds.size()), 1e3 * seconds(Clock::now() - began)};
   });
 }
 
-void MapProcess::send_frames() {
-  const bool view_changed = server_.take_view_changed();
-  if (!view_changed && !map_changed_) return;
-  const std::set<double> radii = server_.view_radii();
-  if (radii.empty()) return;
-  map_changed_ = false;
-  StreamFrame frame{.T_map_body = map_.T_map_body(),
-                    .levels = {},
-                    .odometry_path = map_.odometry_path(),
-                    .corrected_path = map_.corrected_path(),
-                    .loop_edges = map_.loop_edges()};
-  std::map<double, SharedBytes> frames;
-  for (const double radius : radii) {
-    frame.levels = map_.voxels().view(radius);
-    frames[radius] = std::make_shared<const std::string>(encode_frame(frame));
+void MapProcess::answer_viewers() {
+  for (const ViewerRequest& asked : server_.take_requests()) {
+    if (const auto* clouds = std::get_if<LoopCloudsRequest>(&asked.request)) answer_clouds(asked.viewer, *clouds);
+    if (const auto* command = std::get_if<LoopCommandRequest>(&asked.request)) send_command(asked.viewer, *command);
   }
-  server_.publish_frames(std::move(frames));
+}
+
+void MapProcess::answer_clouds(std::int64_t viewer, const LoopCloudsRequest& request) {
+  const std::vector<Eigen::Vector3f> from = map_.placed_cloud(request.from_id);
+  const std::vector<Eigen::Vector3f> to = map_.placed_cloud(request.to_id);
+  if (from.empty() || to.empty()) {
+    server_.answer(viewer, {shared(error_text("no_clouds", "the map holds no cloud of one of these keyframes")), {}});
+    return;
+  }
+  LoopClouds clouds = encode_loop_clouds(request, from, to);
+  server_.answer(viewer, {shared(std::move(clouds.text)), shared(std::move(clouds.bytes))});
+}
+
+void MapProcess::send_command(std::int64_t viewer, const LoopCommandRequest& request) {
+  graph_command_t command;
+  command.utime = hud_.map.utime;
+  command.sequence = command_sequence_++;
+  command.session = session_.value_or(-1);
+  command.command = request.veto ? graph_command_t::VETO_LOOP : graph_command_t::WITHDRAW_LOOP;
+  command.sender = "map_builder";
+  command.from_id = request.from_id;
+  command.to_id = request.to_id;
+  link_.publish(channels::kGraphCommand, command);
+  const nlohmann::ordered_json reply{{"type", "command"},
+                                     {"command", request.veto ? "veto" : "withdraw"},
+                                     {"from", request.from_id},
+                                     {"to", request.to_id},
+                                     {"sent", true}};
+  server_.answer(viewer, {shared(reply.dump()), {}});
+}
+
+void MapProcess::refresh_paths() {
+  loop_edges_ = std::make_shared<const std::vector<LoopEdge>>(map_.loop_edges());
+  if (Clock::now() < next_paths_) return;
+  odometry_path_ = std::make_shared<const std::vector<Eigen::Vector3f>>(map_.odometry_path());
+  corrected_path_ = std::make_shared<const std::vector<Eigen::Vector3f>>(map_.corrected_path());
+  const double bytes = 2.0 * kPathPointBytes * static_cast<double>(odometry_path_->size());
+  const auto period = std::chrono::duration<double>(bytes / kPathBytesPerSecond);
+  next_paths_ =
+      Clock::now() + std::max<Clock::duration>(std::chrono::duration_cast<Clock::duration>(period), kMinPathPeriod);
+}
+
+void MapProcess::make_pictures() {
+  ViewUpdate update;
+  const bool view_changed = server_.take_view_changed();
+  const std::set<double> radii = server_.view_radii();
+  if ((view_changed || map_changed_) && !radii.empty()) {
+    map_changed_ = false;
+    ++picture_number_;
+    refresh_paths();
+    pictures_ = timed(budget_.picture, [&] {
+      std::map<double, SharedPicture> pictures;
+      std::erase_if(builders_, [&](const auto& entry) { return !radii.contains(entry.first); });
+      for (const double radius : radii) {
+        MapPicture picture = builders_.try_emplace(radius, radius).first->second.build(map_.voxels());
+        picture.number = picture_number_;
+        picture.utime = hud_.map.utime;
+        picture.revision = map_.revision();
+        picture.T_map_body = map_.T_map_body();
+        picture.odometry_path = odometry_path_;
+        picture.corrected_path = corrected_path_;
+        picture.loop_edges = loop_edges_;
+        pictures[radius] = std::make_shared<const MapPicture>(std::move(picture));
+      }
+      return pictures;
+    });
+    update.pictures = pictures_;
+  }
+  publish_news(std::move(update));
+}
+
+void MapProcess::publish_news(ViewUpdate update) {
+  update.events = events_.take();
+  update.session = session_.value_or(0);
+  update.revision = map_.revision();
+  if (std::exchange(loops_changed_, false)) update.loops = shared(loops_.text());
+  if (std::exchange(keyframes_changed_, false)) {
+    KeyframeList list{.revision = map_.revision(), .entries = {}};
+    for (const auto& [id, position] : map_.keyframe_positions()) list.entries.push_back({id, position});
+    update.keyframes = std::make_shared<const KeyframeList>(std::move(list));
+  }
+  server_.publish(std::move(update));
 }
 
 void MapProcess::update_status() {
   const ThreeLevelMap& voxels = map_.voxels();
-  hud_.map.voxels_local = static_cast<std::int32_t>(voxels.level(0).size());
-  hud_.map.voxels_mid = static_cast<std::int32_t>(voxels.level(1).size());
-  hud_.map.voxels_coarse = static_cast<std::int32_t>(voxels.level(2).size());
-  hud_.map.bytes = static_cast<std::int64_t>(voxels.bytes() + map_.clouds().bytes());
+  hud_.map.voxels_local = static_cast<std::int32_t>(voxels.size(0));
+  hud_.map.voxels_mid = static_cast<std::int32_t>(voxels.size(1));
+  hud_.map.voxels_coarse = static_cast<std::int32_t>(voxels.size(2));
+  budget_.voxel_bytes = voxels.bytes();
+  budget_.cloud_bytes = map_.clouds().bytes();
+  hud_.map.bytes = static_cast<std::int64_t>(budget_.voxel_bytes + budget_.cloud_bytes);
   hud_.map.keyframes = static_cast<std::int32_t>(map_.clouds().size());
   hud_.map.rebuilds = map_.rebuilds();
   hud_.map.clients = server_.clients();
-  hud_.map.frames_sent = server_.counters().frames_sent;
-  hud_.map.frames_skipped = server_.counters().frames_skipped;
+  hud_.map.frames_sent = server_.counters().snapshots + server_.counters().deltas;
+  hud_.map.frames_skipped = server_.counters().pictures_skipped;
+  hud_.map.revision = map_.revision();
   hud_.rebuilding = map_.rebuilding();
   hud_.state_age_s = seconds(Clock::now() - last_state_);
   hud_.messages_lost = clouds_.incomplete() + keyframes_.incomplete() + revisions_.incomplete();
-  for (const runtime::ReceiverCounts* receiver : receivers_) hud_.messages_lost += receiver->lost;
+  hud_.messages_received = 0;
+  for (const runtime::ReceiverCounts* receiver : receivers_) {
+    hud_.messages_lost += receiver->lost;
+    hud_.messages_received += receiver->received;
+  }
+  for (const ProcessTable::Change& change : processes_.silent_since(Clock::now())) {
+    events_.process(hud_.map.utime, change);
+  }
+  hud_.processes = processes_.rows();
 }
 
 void MapProcess::send_hud() {
   update_status();
-  server_.publish_status(hud_json(hud_));
+  ViewUpdate update;
+  update.hud = shared(hud_json(hud_));
+  server_.publish(std::move(update));
 }
 
 void MapProcess::report() {
   update_status();
   std::int8_t state = health_t::OK;
   hud_.health = "OK";
-  if (map_.voxels().coarsened() > 0) {
+  if (map_.voxels().coarsening() > 0) {
     state = health_t::DEGRADED;
-    hud_.health = "DEGRADED: map.max_voxels is reached, the finest level was coarsened";
+    hud_.health = "DEGRADED: map.max_voxels is reached, the finest level is left out";
   } else if (refused_clouds_ + map_.refused_poses() > 0) {
     state = health_t::DEGRADED;
     hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, map_.refused_poses());
   }
-  server_.set_api_status(status_json(hud_));
+  ViewUpdate update;
+  update.api_status = shared(status_json(hud_, budget_, server_.counters(), pictures_, loops_.text()));
+  server_.publish(std::move(update));
   link_.publish(channels::kMapStatus, hud_.map);
   ++hud_.map.sequence;
   link_.report_health(hud_.map.utime, state, hud_.health, resets_);

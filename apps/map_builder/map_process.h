@@ -7,7 +7,11 @@
 #include <optional>
 
 #include "map/live_map.h"
+#include "map/picture_builder.h"
+#include "map_builder/event_feed.h"
 #include "map_builder/hud.h"
+#include "map_builder/loop_table.h"
+#include "map_builder/process_table.h"
 #include "map_builder/view_server.h"
 #include "messages/graph_messages.h"
 #include "messages/keyframe_messages.h"
@@ -37,9 +41,17 @@ class MapProcess {
   void on_keyframe(const Keyframe& keyframe);
   void on_revision(const messages::GraphRevision& revision);
   void on_loop(const loop_result_t& loop);
+  void on_scan_stats(const scan_stats_t& scan);
+  void on_state(const state_t& state);
+  void on_health(const health_t& health);
 
   void start_or_finish_rebuild();
-  void send_frames();
+  void answer_viewers();
+  void answer_clouds(std::int64_t viewer, const LoopCloudsRequest& request);
+  void send_command(std::int64_t viewer, const LoopCommandRequest& request);
+  void make_pictures();
+  void refresh_paths();
+  void publish_news(ViewUpdate update);
   void send_hud();
   void report();
   void request_missing_keyframes();
@@ -54,17 +66,33 @@ class MapProcess {
   messages::RevisionAssembler revisions_;
   std::vector<const runtime::ReceiverCounts*> receivers_;
   HudData hud_;
+  MapBudget budget_;
+  EventFeed events_;
+  LoopTable loops_;
+  ProcessTable processes_;
   Clock::time_point last_state_{};
   Clock::duration frame_period_;
   std::optional<std::int32_t> session_;
   int resets_ = 0;
   bool map_changed_ = true;
+  bool loops_changed_ = true;
+  bool keyframes_changed_ = true;
+  // Pictures share these until they change.
+  SharedPath odometry_path_;
+  SharedPath corrected_path_;
+  SharedLoopEdges loop_edges_;
+  Clock::time_point next_paths_{};
+  std::map<double, PictureBuilder> builders_;  // by view radius [m], as are the pictures
+  std::map<double, SharedPicture> pictures_;
+  std::int64_t picture_number_ = 0;
   std::int64_t refused_clouds_ = 0;
   std::int32_t graph_keyframes_ = 0;
   std::map<std::int32_t, int> request_counts_;
   std::int32_t request_sequence_ = 0;
+  std::int32_t command_sequence_ = 0;
   struct Rebuilt {
     ThreeLevelMap map;
+    int keyframes;
     double milliseconds;
   };
   // Last, so that a rebuild under way has ended before anything else goes.

@@ -7,105 +7,236 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <nlohmann/json.hpp>
 
-#include "map/view_request.h"
+#include "map/stream_encoding.h"
+#include "map_builder/stream_texts.h"
+#include "map_builder/tcp_progress.h"
 
 namespace ignis {
 namespace {
 
 namespace net = boost::asio;
 namespace beast = boost::beast;
+namespace websocket = beast::websocket;
+using Clock = std::chrono::steady_clock;
+
 constexpr auto kNoThrow = net::as_tuple(net::use_awaitable);
 constexpr int kMaxBadRequests = 20;
-constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one step share an encoded frame
+constexpr std::size_t kMaxAnswers = 64;
+constexpr double kRequestsPerSecond = 20.0;
+constexpr double kRequestBurst = 60.0;
+constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one step share pictures and frames
+constexpr std::chrono::seconds kLifeTimeout{10};
+constexpr std::chrono::milliseconds kSlowRoundTrip{500};
+
+SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
 
 }  // namespace
 
-ViewClient::ViewClient(Stream stream, double max_view_radius, StreamCounters& counters,
-                       std::function<void()> on_view_changed)
-    : stream_(std::move(stream)),
+ViewClient::ViewClient(std::int64_t id, Stream stream, ViewerContext& context)
+    : id_(id),
+      stream_(std::move(stream)),
       wake_(stream_.get_executor(), net::steady_timer::time_point::max()),
-      max_view_radius_(max_view_radius),
-      view_radius_(std::min(kDefaultViewRadius, max_view_radius)),
-      counters_(counters),
-      on_view_changed_(std::move(on_view_changed)) {}
+      context_(context),
+      view_radius_(std::min(kDefaultViewRadius, context.max_view_radius_m)),
+      requests_(kRequestsPerSecond, kRequestBurst) {}
 
 net::awaitable<void> ViewClient::serve(const Request& upgrade) {
   const auto self = shared_from_this();
+  stream_.control_callback([this](websocket::frame_type kind, beast::string_view) { on_control(kind); });
   const auto [refused] = co_await stream_.async_accept(upgrade, kNoThrow);
   if (refused) co_return;
   open_ = true;
-  on_view_changed_();
+  last_life_ = Clock::now();
+  answers_.push_back({shared(context_.hello()), nullptr});
+  context_.on_view_changed();
   net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, net::detached);
-  beast::flat_buffer buffer;
-  while (open_) {
-    const auto [error, bytes] = co_await stream_.async_read(buffer, kNoThrow);
-    if (error) break;
-    answer_request(stream_.got_text() ? beast::buffers_to_string(buffer.data()) : std::string());
-    buffer.consume(buffer.size());
-    if (bad_requests_ > kMaxBadRequests) {
-      co_await stream_.async_close(beast::websocket::close_code::policy_error, kNoThrow);
-      break;
-    }
-  }
+  co_await read_loop();
   close();
 }
 
-void ViewClient::answer_request(const std::string& text) {
-  nlohmann::json reply;
-  if (const auto radius = parse_view_request(text, max_view_radius_)) {
-    reply = {{"type", "view"}, {"radius", *radius}};
-    const double served = std::min(max_view_radius_, kRadiusStep * std::ceil(*radius / kRadiusStep));
-    if (std::exchange(view_radius_, served) != served) on_view_changed_();
-  } else {
-    ++bad_requests_;
-    ++counters_.refused_requests;
-    reply = {{"type", "error"}, {"code", "bad_request"}, {"reason", radius.error()}};
+net::awaitable<void> ViewClient::read_loop() {
+  beast::flat_buffer buffer;
+  while (open_) {
+    const auto [error, bytes] = co_await stream_.async_read(buffer, kNoThrow);
+    last_life_ = Clock::now();
+    if (error) {
+      count_failure(error);
+      co_return;
+    }
+    if (!stream_.got_text()) {
+      ++context_.counters.binary_messages;
+      co_await refuse(websocket::close_code::unknown_data);
+      co_return;
+    }
+    if (!requests_.allow(last_life_)) too_demanding_ = true;
+    if (!too_demanding_) handle(beast::buffers_to_string(buffer.data()));
+    buffer.consume(buffer.size());
+    // The answer goes out before the next message is looked at, which may be one that ends the connection.
+    co_await net::post(stream_.get_executor(), net::use_awaitable);
+    if (too_demanding_ || bad_requests_ > kMaxBadRequests) {
+      ++context_.counters.policy_closes;
+      co_await refuse(websocket::close_code::policy_error);
+      co_return;
+    }
   }
-  reply_ = std::make_shared<const std::string>(reply.dump());
-  wake_.cancel();
 }
 
-void ViewClient::offer_frame(SharedBytes frame) {
-  if (std::exchange(frame_, std::move(frame))) ++counters_.frames_skipped;
-  wake_.cancel();
+net::awaitable<void> ViewClient::refuse(websocket::close_code code) {
+  open_ = false;
+  wake();
+  co_await stream_.async_close(code, kNoThrow);
 }
 
-void ViewClient::offer_status(SharedBytes status) {
-  status_ = std::move(status);
-  wake_.cancel();
+void ViewClient::count_failure(const beast::error_code& error) {
+  if (error == websocket::error::bad_frame_payload) {
+    ++context_.counters.invalid_texts;
+  } else if (error == websocket::error::message_too_big || error == websocket::error::buffer_overflow) {
+    ++context_.counters.oversized;
+  } else if (error == websocket::condition::protocol_violation) {
+    ++context_.counters.protocol_errors;
+  }
+}
+
+void ViewClient::on_control(websocket::frame_type kind) {
+  last_life_ = Clock::now();
+  if (kind == websocket::frame_type::ping && !requests_.allow(last_life_)) {
+    // Answering pings costs a write each; a flood of them ends like a flood of requests.
+    if (std::exchange(too_demanding_, true)) return;
+    ++context_.counters.policy_closes;
+    const auto close_it = [self = shared_from_this()] { return self->refuse(websocket::close_code::policy_error); };
+    net::co_spawn(stream_.get_executor(), close_it, net::detached);
+  } else if (kind == websocket::frame_type::pong) {
+    if (std::exchange(awaits_pong_, false)) round_trip_ = last_life_ - batch_began_;
+    wake();
+  }
+}
+
+void ViewClient::handle(const std::string& text) {
+  const auto request = parse_client_request(text, context_.max_view_radius_m);
+  if (!request) {
+    ++bad_requests_;
+    ++context_.counters.bad_requests;
+    answer({shared(error_text("bad_request", request.error())), nullptr});
+  } else if (const auto* view = std::get_if<ViewRequest>(&*request)) {
+    answer({shared(nlohmann::json{{"type", "view"}, {"radius", view->radius_m}}.dump()), nullptr});
+    const double served = std::min(context_.max_view_radius_m, kRadiusStep * std::ceil(view->radius_m / kRadiusStep));
+    if (std::exchange(view_radius_, served) != served) context_.on_view_changed();
+  } else if (std::holds_alternative<ResyncRequest>(*request)) {
+    ++context_.counters.resyncs;
+    seen_.picture = nullptr;
+    wake();
+  } else {
+    context_.on_request(id_, *request);
+  }
+}
+
+void ViewClient::answer(Answer answer) {
+  if (answers_.size() >= kMaxAnswers) {
+    too_demanding_ = true;
+    return;
+  }
+  answers_.push_back(std::move(answer));
+  wake();
+}
+
+void ViewClient::check_life(TimePoint now) {
+  if (!open_) return;
+  const std::uint64_t acknowledged = bytes_acknowledged(beast::get_lowest_layer(stream_).socket().native_handle());
+  if (std::exchange(acknowledged_, acknowledged) != acknowledged) last_life_ = now;
+  if (now - last_life_ < kLifeTimeout) return;
+  ++context_.counters.idle_closes;
+  close();
 }
 
 void ViewClient::close() {
   open_ = false;
-  wake_.cancel();
+  wake();
   beast::get_lowest_layer(stream_).cancel();
 }
 
 net::awaitable<void> ViewClient::write_loop() {
   const auto self = shared_from_this();
   while (open_) {
-    if (!reply_ && !status_ && !frame_) {
-      co_await wake_.async_wait(kNoThrow);
-    } else if (!co_await write_one()) {
-      close();
-    }
+    wrote_ = false;
+    // A failed write ends the writing alone: the reader may be in the middle of telling the viewer why it is closed.
+    if (!co_await (awaits_pong_ ? write_short_answers() : write_news())) co_return;
+    if (!wrote_ && open_) co_await wake_.async_wait(kNoThrow);
   }
 }
 
-net::awaitable<bool> ViewClient::write_one() {
+net::awaitable<bool> ViewClient::write_news() {
+  batch_began_ = Clock::now();
   // Small texts go first: a large frame must not starve the state.
-  SharedBytes& slot = reply_ ? reply_ : status_ ? status_ : frame_;
-  const bool is_frame = &slot == &frame_;
-  const SharedBytes message = std::exchange(slot, nullptr);
-  stream_.binary(is_frame);
+  const bool is_slow = round_trip_ > kSlowRoundTrip;
+  if (!is_slow || !frame_is_next_) {
+    if (!co_await write_texts()) co_return false;
+  }
+  frame_is_next_ = wrote_;
+  if (!is_slow || !wrote_) {
+    if (!co_await write_frame()) co_return false;
+  }
+  if (!wrote_ || !open_) co_return true;
+  awaits_pong_ = true;
+  const auto [error] = co_await stream_.async_ping({}, kNoThrow);
+  co_return !error;
+}
+
+net::awaitable<bool> ViewClient::write_texts() {
+  if (!co_await write_answers()) co_return false;
+  for (const SharedBytes& text : context_.board.take_texts(seen_)) {
+    if (!co_await write_message(false, text)) co_return false;
+  }
+  co_return true;
+}
+
+/// Texts alone need not wait for the pong of the batch before: their number is bounded by what the viewer asks.
+net::awaitable<bool> ViewClient::write_short_answers() {
+  while (!answers_.empty() && !answers_.front().binary) {
+    const Answer answer = std::move(answers_.front());
+    answers_.pop_front();
+    if (!co_await write_message(false, answer.text)) co_return false;
+  }
+  co_return true;
+}
+
+net::awaitable<bool> ViewClient::write_answers() {
+  while (!answers_.empty()) {
+    const Answer answer = std::move(answers_.front());
+    answers_.pop_front();
+    if (!co_await write_message(false, answer.text)) co_return false;
+    if (answer.binary && !co_await write_message(true, answer.binary)) co_return false;
+  }
+  co_return true;
+}
+
+net::awaitable<bool> ViewClient::write_frame() {
+  const SharedPicture picture = context_.board.picture(view_radius_);
+  if (!picture || picture == seen_.picture) co_return true;
+  if (seen_.picture && shows_the_same(*seen_.picture, *picture)) {
+    seen_.picture = picture;
+    co_return true;
+  }
+  const StreamFrame frame = context_.frames.frame(seen_.picture, picture);
+  if (seen_.picture) context_.counters.pictures_skipped += picture->number - seen_.picture->number - 1;
+  seen_.picture = picture;
+  ++sequence_;
+  if (!co_await write_message(false, shared(frame_text(*picture, frame.is_snapshot, sequence_)))) co_return false;
+  if (!co_await write_message(true, frame.bytes)) co_return false;
+  ++(frame.is_snapshot ? context_.counters.snapshots : context_.counters.deltas);
+  context_.counters.frame_bytes += static_cast<std::int64_t>(frame.bytes->size());
+  co_return true;
+}
+
+net::awaitable<bool> ViewClient::write_message(bool binary, SharedBytes message) {
+  wrote_ = true;
+  stream_.binary(binary);
   const auto [error, bytes] = co_await stream_.async_write(net::buffer(*message), kNoThrow);
-  if (!error && is_frame) ++counters_.frames_sent;
   co_return !error;
 }
 

@@ -1,66 +1,104 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
+#include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
+#include "map/client_request.h"
+#include "map_builder/frame_cache.h"
+#include "map_builder/rate_limit.h"
+#include "map_builder/stream_counters.h"
+#include "map_builder/view_board.h"
+
 namespace ignis {
 
-/// A message that several clients share.
-using SharedBytes = std::shared_ptr<const std::string>;
-
-/// Counters over all clients; written by the server's thread, read by any.
-struct StreamCounters {
-  std::atomic<std::int64_t> frames_sent = 0;
-  std::atomic<std::int64_t> frames_skipped = 0;
-  std::atomic<std::int64_t> refused_requests = 0;
+/// What all viewers share. Belongs to the server's thread.
+struct ViewerContext {
+  ViewBoard board;
+  FrameCache frames;
+  StreamCounters counters;
+  double max_view_radius_m = 0.0;
+  std::function<std::string()> hello;
+  std::function<void()> on_view_changed;
+  std::function<void(std::int64_t viewer, ClientRequest request)> on_request;  ///< those that the map's thread answers
 };
 
-/// One viewer. It holds one slot for the newest map frame, one for the newest status text and one for the newest reply;
-/// a message that is still waiting is replaced, so a slow viewer gets fewer frames but never old ones, and the memory
-/// per viewer is bounded. One write is under way at a time. All calls on the server's thread.
+/// An answer to one viewer's request: a text, and perhaps the binary message that it announces.
+struct Answer {
+  SharedBytes text;
+  SharedBytes binary;
+};
+
+/// One viewer. It goes and comes with the board: write what is newest, send a ping behind it, wait for the pong, look
+/// again. So at most one batch is under way, whatever buffers lie between, and what a slow viewer gets was newest when
+/// its previous batch had arrived. A batch is texts and a frame; a viewer that takes long gets texts and frames in
+/// turn, so that no frame ages behind texts. All calls on the server's thread.
 class ViewClient : public std::enable_shared_from_this<ViewClient> {
  public:
   using Stream = boost::beast::websocket::stream<boost::beast::tcp_stream>;
   using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+  using TimePoint = std::chrono::steady_clock::time_point;
 
-  ViewClient(Stream stream, double max_view_radius, StreamCounters& counters, std::function<void()> on_view_changed);
+  ViewClient(std::int64_t id, Stream stream, ViewerContext& context);
 
   /// Accepts the upgrade and serves the viewer until it leaves.
   boost::asio::awaitable<void> serve(const Request& upgrade);
 
-  void offer_frame(SharedBytes frame);
-  void offer_status(SharedBytes status);
+  /// The board has news.
+  void wake() { wake_.cancel(); }
+  void answer(Answer answer);
+  /// Closes a connection on which nothing has moved for too long.
+  void check_life(TimePoint now);
   void close();
 
+  [[nodiscard]] std::int64_t id() const { return id_; }
   [[nodiscard]] double view_radius() const { return view_radius_; }
 
  private:
+  boost::asio::awaitable<void> read_loop();
+  boost::asio::awaitable<void> refuse(boost::beast::websocket::close_code code);
   boost::asio::awaitable<void> write_loop();
-  boost::asio::awaitable<bool> write_one();
-  void answer_request(const std::string& text);
+  boost::asio::awaitable<bool> write_news();
+  boost::asio::awaitable<bool> write_texts();
+  boost::asio::awaitable<bool> write_short_answers();
+  boost::asio::awaitable<bool> write_answers();
+  boost::asio::awaitable<bool> write_frame();
+  boost::asio::awaitable<bool> write_message(bool binary, SharedBytes message);
+  void on_control(boost::beast::websocket::frame_type kind);
+  void handle(const std::string& text);
+  void count_failure(const boost::beast::error_code& error);
 
+  std::int64_t id_;
   Stream stream_;
   boost::asio::steady_timer wake_;
-  double max_view_radius_;
+  ViewerContext& context_;
   double view_radius_;
-  StreamCounters& counters_;
-  std::function<void()> on_view_changed_;
-  SharedBytes frame_;
-  SharedBytes status_;
-  SharedBytes reply_;
+  ViewBoard::Seen seen_;
+  std::deque<Answer> answers_;
+  std::int64_t sequence_ = 0;  // of the last frame sent
+  RateLimit requests_;
   int bad_requests_ = 0;
+  bool too_demanding_ = false;  // asks faster than allowed, or does not read its answers
   bool open_ = false;
+  bool awaits_pong_ = false;
+  bool wrote_ = false;
+  bool frame_is_next_ = false;  // of a slow viewer
+  TimePoint batch_began_{};
+  std::chrono::steady_clock::duration round_trip_{};  // of the last batch
+  TimePoint last_life_ = std::chrono::steady_clock::now();
+  std::uint64_t acknowledged_ = 0;
 };
 
 }  // namespace ignis

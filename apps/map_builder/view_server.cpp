@@ -35,7 +35,11 @@ constexpr std::chrono::seconds kIdleTimeout{10};
 constexpr std::chrono::milliseconds kAcceptPause{100};
 constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
 constexpr std::size_t kMaxInboundBytes = 64 * 1024;
-constexpr int kSpareConnections = 16;  // beside the viewers: pages and status requests
+constexpr int kSpareConnections = 16;    // beside the viewers: pages and status requests
+constexpr int kSendBuffer = 256 * 1024;  // [bytes] per viewer in the kernel: more would only hold what is no longer new
+constexpr double kHttpPerSecond = 100.0;
+constexpr double kHttpBurst = 300.0;
+constexpr std::chrono::seconds kWatchPeriod{1};
 constexpr char kStreamPath[] = "/ws/lio_map";
 constexpr char kStatusPath[] = "/api/status";
 
@@ -69,9 +73,23 @@ class ConnectionCount {
 
 }  // namespace
 
-ViewServer::ViewServer(const runtime::HmiConfig& config)
-    : config_(config), acceptor_(open_listening_socket(context_, config.address, config.port)) {
+ViewServer::ViewServer(const runtime::HmiConfig& config, StreamTerms terms)
+    : config_(config),
+      terms_(std::move(terms)),
+      http_requests_(kHttpPerSecond, kHttpBurst),
+      acceptor_(open_listening_socket(context_, config.address, config.port)) {
+  viewers_.max_view_radius_m = config_.max_view_radius_m;
+  viewers_.hello = [this] { return hello_text(terms_, viewers_.board.session(), viewers_.board.revision()); };
+  viewers_.on_view_changed = [this] {
+    update_radii();
+    view_changed_ = true;
+  };
+  viewers_.on_request = [this](std::int64_t viewer, ClientRequest request) {
+    const std::lock_guard lock(mutex_);
+    if (requests_.size() < kMaxRequests) requests_.push_back({viewer, request});
+  };
   net::co_spawn(context_, accept_loop(), net::detached);
+  net::co_spawn(context_, watch_viewers(), net::detached);
   thread_ = std::thread([this] { context_.run(); });
 }
 
@@ -89,34 +107,43 @@ std::string ViewServer::address() const {
 }
 
 std::set<double> ViewServer::view_radii() const {
-  const std::lock_guard lock(radii_mutex_);
+  const std::lock_guard lock(mutex_);
   return radii_;
 }
 
 void ViewServer::update_radii() {
   std::set<double> radii;
-  for (const auto& client : clients_) radii.insert(client->view_radius());
-  const std::lock_guard lock(radii_mutex_);
+  for (const auto& [id, client] : clients_) radii.insert(client->view_radius());
+  const std::lock_guard lock(mutex_);
   radii_ = std::move(radii);
 }
 
-void ViewServer::publish_frames(std::map<double, SharedBytes> frames) {
-  net::post(context_, [this, frames = std::move(frames)] {
-    for (const auto& client : clients_) {
-      const auto found = frames.find(client->view_radius());
-      if (found != frames.end()) client->offer_frame(found->second);
-    }
+std::vector<ViewerRequest> ViewServer::take_requests() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(requests_, {});
+}
+
+void ViewServer::publish(ViewUpdate update) {
+  net::post(context_, [this, update = std::move(update)]() mutable {
+    if (viewers_.board.apply(std::move(update))) viewers_.frames.clear();
+    for (const auto& [id, client] : clients_) client->wake();
   });
 }
 
-void ViewServer::publish_status(std::string hud_json) {
-  net::post(context_, [this, text = std::make_shared<const std::string>(std::move(hud_json))] {
-    for (const auto& client : clients_) client->offer_status(text);
+void ViewServer::answer(std::int64_t viewer, Answer answer) {
+  net::post(context_, [this, viewer, answer = std::move(answer)]() mutable {
+    const auto found = clients_.find(viewer);
+    if (found != clients_.end()) found->second->answer(std::move(answer));
   });
 }
 
-void ViewServer::set_api_status(std::string json) {
-  net::post(context_, [this, text = std::make_shared<const std::string>(std::move(json))] { api_status_ = text; });
+net::awaitable<void> ViewServer::watch_viewers() {
+  net::steady_timer timer(context_);
+  while (true) {
+    timer.expires_after(kWatchPeriod);
+    co_await timer.async_wait(kNoThrow);
+    for (const auto& [id, client] : clients_) client->check_life(std::chrono::steady_clock::now());
+  }
 }
 
 net::awaitable<void> ViewServer::accept_loop() {
@@ -159,13 +186,16 @@ net::awaitable<void> ViewServer::serve_requests(beast::tcp_stream& stream) {
     Response response = refusal(http::status::bad_request, "the request is malformed or has a body");
     if (!is_malformed && websocket::is_upgrade(parser.get())) {
       response = refuse_upgrade(parser.get(), refused);
-      if (!refused) {
+      if (refused) {
+        ++viewers_.counters.refused_upgrades;
+      } else {
         co_await serve_viewer(std::move(stream), parser.release());
         co_return;
       }
     } else if (!is_malformed) {
       response = answer(parser.get());
     }
+    if (http::to_status_class(response.result()) != http::status_class::successful) ++viewers_.counters.refused_http;
     keep_alive = !refused && parser.keep_alive();
     response.keep_alive(keep_alive);
     http::response_serializer<http::string_body> serializer(response);
@@ -180,14 +210,18 @@ net::awaitable<void> ViewServer::serve_requests(beast::tcp_stream& stream) {
   std::ignore = stream.socket().shutdown(net::ip::tcp::socket::shutdown_send, ignored);
 }
 
-ViewServer::Response ViewServer::answer(const Request& request) const {
+ViewServer::Response ViewServer::answer(const Request& request) {
+  if (!http_requests_.allow(std::chrono::steady_clock::now())) {
+    return refusal(http::status::too_many_requests, "too many requests; try again in a second");
+  }
   if (!host_is_allowed(request[http::field::host], config_.allowed_origin)) {
     return refusal(http::status::forbidden, "open the view by IP address or as localhost");
   }
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refusal(http::status::method_not_allowed, "only GET is served");
   }
-  if (request.target() == kStatusPath) return make_response(http::status::ok, "application/json", *api_status_);
+  if (request.target() == kStatusPath)
+    return make_response(http::status::ok, "application/json", *viewers_.board.api_status());
   if (request.target() == kStreamPath) return refusal(http::status::upgrade_required, "this is a WebSocket");
   const std::string_view target = request.target().substr(0, request.target().find('?'));
   const auto files = web_files();
@@ -216,22 +250,23 @@ ViewServer::Response ViewServer::refuse_upgrade(const Request& request, bool& re
 
 net::awaitable<void> ViewServer::serve_viewer(beast::tcp_stream stream, Request request) {
   stream.expires_never();  // the WebSocket has its own timers
+  beast::error_code ignored;
+  stream.socket().set_option(net::socket_base::send_buffer_size(kSendBuffer), ignored);
+  stream.socket().set_option(net::ip::tcp::no_delay(true), ignored);
   ViewClient::Stream upgraded(std::move(stream));
-  upgraded.set_option(websocket::stream_base::timeout{kRequestTimeout, kIdleTimeout, true});
+  // Only the handshakes are timed here: an idle timer that counts what arrives would end slow readers (check_life).
+  upgraded.set_option(websocket::stream_base::timeout{kRequestTimeout, websocket::stream_base::none(), false});
   upgraded.set_option(websocket::stream_base::decorator(
       [](websocket::response_type& response) { response.set(http::field::sec_websocket_protocol, kStreamProtocol); }));
   upgraded.read_message_max(kMaxInboundBytes);
   upgraded.auto_fragment(false);  // control frames can wait for one map frame; 4 kB pieces would cost a call each
-  const auto client = std::make_shared<ViewClient>(std::move(upgraded), config_.max_view_radius_m, counters_, [this] {
-    update_radii();
-    view_changed_ = true;
-  });
+  const auto client = std::make_shared<ViewClient>(++next_client_, std::move(upgraded), viewers_);
   // The place is taken before the handshake ends, so that nobody slips past the limit meanwhile.
-  clients_.insert(client);
+  clients_[client->id()] = client;
   client_count_ = static_cast<int>(clients_.size());
   update_radii();
   co_await client->serve(request);
-  clients_.erase(client);
+  clients_.erase(client->id());
   client_count_ = static_cast<int>(clients_.size());
   update_radii();
 }

@@ -10,7 +10,7 @@ struct HmiConfig {
   std::string address = "127.0.0.1";
   int port = 8080;
   int max_clients = 32;
-  double frame_rate_hz = 8.0;
+  double frame_rate_hz = 10.0;
   double max_view_radius_m = 150.0;
   std::string allowed_origin;  ///< empty: only pages that this server itself delivered
 

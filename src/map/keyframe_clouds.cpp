@@ -1,91 +1,160 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map/keyframe_clouds.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <tuple>
+#include <utility>
+
+#include "common/grid.h"
+#include "map/tile_grid.h"
 
 namespace ignis {
 namespace {
 
-std::shared_ptr<const std::vector<CloudPoint>> points_of(const VoxelLevel& voxels) {
-  auto points = std::make_shared<std::vector<CloudPoint>>();
-  points->reserve(voxels.size());
-  for (const auto& [cell, point] : voxels.sorted()) {
-    points->push_back({point.p_world.cast<float>(), point.intensity});
+constexpr double kBlockMetres = 2.0;
+
+CellIndex cell_of(const Eigen::Vector3d& p, double per_metre) {
+  return {floor_to_int(p.x() * per_metre), floor_to_int(p.y() * per_metre), floor_to_int(p.z() * per_metre)};
+}
+
+/// A point as the map can order it, or nothing: coordinates that it can hold, an intensity that is a number.
+std::optional<CloudPoint> sound(const Eigen::Vector3d& p, float intensity) {
+  // Also false for what is not a number.
+  if (!(p.cwiseAbs().maxCoeff() < kMaxCoordinate)) return std::nullopt;
+  return CloudPoint{p.cast<float>(), intensity > 0.0F ? std::min(intensity, 255.0F) : 0.0F};
+}
+
+/// Neighbours in space become neighbours in memory, so that whoever reads the cloud stays in one tile for long.
+void sort_by_block(std::vector<CloudPoint>& points) {
+  std::vector<std::pair<CellKey, std::uint32_t>> order;
+  order.reserve(points.size());
+  for (const CloudPoint& point : points) {
+    const CellIndex block = cell_of(point.position.cast<double>(), 1.0 / kBlockMetres);
+    order.emplace_back(pack(block), static_cast<std::uint32_t>(order.size()));
   }
-  return points;
+  std::ranges::sort(order);
+  std::vector<CloudPoint> sorted;
+  sorted.reserve(points.size());
+  for (const auto& [block, index] : order) sorted.push_back(points[index]);
+  points = std::move(sorted);
 }
 
 }  // namespace
 
-KeyframeClouds::KeyframeClouds(double cell_m, std::size_t max_points) : max_points_(max_points), open_(cell_m) {}
+KeyframeClouds::KeyframeClouds(double cell_m, std::size_t max_points) : cell_m_(cell_m), max_points_(max_points) {}
 
-void KeyframeClouds::add_keyframe(std::int32_t id, std::span<const CloudPoint> points_body,
-                                  const Pose& T_odom_keyframe) {
-  if (entries_.contains(id)) return;
+std::optional<std::int32_t> KeyframeClouds::open_id() const {
+  return entries_.empty() ? std::nullopt : std::optional(entries_.rbegin()->first);
+}
+
+KeyframeClouds::Kept KeyframeClouds::add_keyframe(std::int32_t id, std::span<const CloudPoint> points_body,
+                                                  const Pose& T_odom_keyframe) {
   const bool is_newest = entries_.empty() || id > entries_.rbegin()->first;
   if (is_newest) {
     close_newest();
     entries_[id] = {T_odom_keyframe, nullptr};
-    insert_open(points_body, Pose{});
-  } else {
-    // A keyframe that was sent again after a loss: its scans went to its predecessor.
-    auto points = std::make_shared<const std::vector<CloudPoint>>(points_body.begin(), points_body.end());
-    closed_points_ += points->size();
-    entries_[id] = {T_odom_keyframe, std::move(points)};
+    return {id, insert_open(points_body, Pose{}, false)};
   }
-  while (points() > max_points_ && entries_.size() > 1) drop_farthest();
+  auto cloud = std::make_shared<CloudData>();
+  for (const CloudPoint& point : points_body) {
+    if (const auto kept = sound(point.position.cast<double>(), point.intensity)) cloud->points.push_back(*kept);
+  }
+  sort_by_block(cloud->points);
+  closed_points_ += cloud->points.size();
+  const std::span<const CloudPoint> kept = cloud->points;
+  entries_[id] = {T_odom_keyframe, std::move(cloud)};
+  return {id, kept};
 }
 
-void KeyframeClouds::add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
-  if (entries_.empty()) return;
-  insert_open(points_body, entries_.rbegin()->second.T_odom_keyframe.inverse() * T_odom_body);
+KeyframeClouds::Kept KeyframeClouds::add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
+  if (entries_.empty()) entries_[kBeforeFirst] = {T_odom_body, nullptr};
+  const auto& [id, entry] = *entries_.rbegin();
+  return {id, insert_open(points_body, entry.T_odom_keyframe.inverse() * T_odom_body, true)};
 }
 
-void KeyframeClouds::insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points) {
+std::span<const CloudPoint> KeyframeClouds::insert_open(std::span<const CloudPoint> points,
+                                                        const Pose& T_keyframe_points, bool are_rays) {
+  const std::size_t before = open_points_.size();
+  const Eigen::Matrix3d R = T_keyframe_points.rotation.normalized().toRotationMatrix();
+  const double per_metre = 1.0 / cell_m_;
   for (const CloudPoint& point : points) {
-    const Eigen::Vector3d p_keyframe = T_keyframe_points * Eigen::Vector3d(point.position.cast<double>());
-    const bool fits = p_keyframe.allFinite() && p_keyframe.cwiseAbs().maxCoeff() < VoxelLevel::kMaxCoordinate;
-    if (fits) open_.insert({p_keyframe, point.intensity, kLive});
+    const Eigen::Vector3d p = R * point.position.cast<double>() + T_keyframe_points.translation;
+    const auto kept = sound(p, point.intensity);
+    if (!kept) continue;
+    // The sensor stands near the body's origin; the few centimetres between are less than a cell.
+    if (open_free_ && are_rays) open_free_->add_ray(T_keyframe_points.translation, p);
+    if (open_free_ && !are_rays) open_free_->add_hit(p);
+    if (open_points_.size() < max_points_ && open_cells_.insert(pack(cell_of(p, per_metre))).second)
+      open_points_.push_back(*kept);
   }
+  return std::span(open_points_).subspan(before);
 }
 
 void KeyframeClouds::close_newest() {
   if (entries_.empty()) return;
-  Entry& newest = entries_.rbegin()->second;
-  newest.points = points_of(open_);
-  closed_points_ += newest.points->size();
-  open_.clear();
+  auto cloud = std::make_shared<CloudData>();
+  cloud->points = std::exchange(open_points_, {});
+  sort_by_block(cloud->points);
+  if (open_free_) cloud->free = open_free_->take();
+  closed_points_ += cloud->points.size();
+  free_cells_ += cloud->free.size();
+  entries_.rbegin()->second.cloud = std::move(cloud);
+  open_cells_.clear();
 }
 
-void KeyframeClouds::drop_farthest() {
+std::vector<std::int32_t> KeyframeClouds::beyond_bound() const {
+  std::vector<std::int32_t> ids;
+  if (points() <= max_points_) return ids;
+  std::vector<std::pair<double, std::int32_t>> by_distance;
   const Eigen::Vector3d here = entries_.rbegin()->second.T_odom_keyframe.translation;
-  auto farthest = entries_.begin();
-  double largest = -1.0;
-  for (auto entry = entries_.begin(); std::next(entry) != entries_.end(); ++entry) {
+  for (auto entry = entries_.begin(); entry != std::prev(entries_.end()); ++entry) {
     const Eigen::Vector3d offset = entry->second.T_odom_keyframe.translation - here;
-    const double distance = std::hypot(offset.x(), offset.z());
-    if (distance > largest) {
-      largest = distance;
-      farthest = entry;
-    }
+    by_distance.emplace_back(std::hypot(offset.x(), offset.z()), entry->first);
   }
-  closed_points_ -= farthest->second.points->size();
-  entries_.erase(farthest);
-  ++dropped_;
+  std::ranges::sort(by_distance, std::greater{});
+  std::size_t left = points();
+  for (const auto& [distance, id] : by_distance) {
+    if (left <= max_points_) break;
+    left -= entries_.at(id).cloud->points.size();
+    ids.push_back(id);
+  }
+  return ids;
 }
 
-std::size_t KeyframeClouds::points() const { return closed_points_ + open_.size(); }
-
-std::shared_ptr<const std::vector<CloudPoint>> KeyframeClouds::cloud(std::int32_t id) const {
-  const auto found = entries_.find(id);
-  if (found == entries_.end()) return std::make_shared<const std::vector<CloudPoint>>();
-  return found->second.points ? found->second.points : points_of(open_);
+void KeyframeClouds::drop(std::span<const std::int32_t> ids) {
+  for (const std::int32_t id : ids) {
+    const auto entry = entries_.find(id);
+    closed_points_ -= entry->second.cloud->points.size();
+    free_cells_ -= entry->second.cloud->free.size();
+    entries_.erase(entry);
+    ++dropped_;
+  }
 }
 
 void KeyframeClouds::clear() {
   entries_.clear();
-  open_.clear();
-  closed_points_ = 0;
+  open_points_ = {};
+  open_cells_.clear();
+  if (open_free_) std::ignore = open_free_->take();
+  closed_points_ = free_cells_ = 0;
+}
+
+std::size_t KeyframeClouds::bytes() const {
+  return points() * sizeof(CloudPoint) + open_cells_.bucket_count() * (sizeof(CellKey) + 1) +
+         entries_.size() * sizeof(decltype(entries_)::value_type) + free_cells_ * sizeof(FreeCell) +
+         (open_free_ ? open_free_->bytes() : 0);
+}
+
+StoredCloud KeyframeClouds::view(std::int32_t id) const {
+  const Entry& entry = entries_.at(id);
+  return entry.cloud ? view_of(*entry.cloud) : StoredCloud{open_points_, {}};
+}
+
+SharedCloud KeyframeClouds::share(std::int32_t id) const {
+  const Entry& entry = entries_.at(id);
+  return entry.cloud ? entry.cloud : std::make_shared<const CloudData>(CloudData{open_points_, {}});
 }
 
 }  // namespace ignis

@@ -4,55 +4,92 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include <boost/unordered/unordered_flat_set.hpp>
+
 #include "common/measurements.h"
 #include "common/pose.h"
-#include "map/voxel_level.h"
+#include "map/free_space.h"
+#include "map/stored_cloud.h"
 
 namespace ignis {
 
-/// What a map is rebuilt from: for each keyframe the cloud that came with it and the live scans that followed it, all
-/// in the keyframe's body frame, one point per cell of the local level. A correction of the keyframe's pose thus
-/// carries everything that was seen from there, and a rebuild loses no detail.
+/// Everything that the map is made of: for each keyframe the cloud that came with it and the live scans that followed
+/// it, all in the keyframe's body frame. A correction of the keyframe's pose thus carries everything that was seen from
+/// there.
 ///
-/// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped.
+/// A keyframe is open while scans are added to it: the newest one. Of each cell (of the local level's size, body frame)
+/// it keeps the point that came first; later points say nothing new, so what is kept is known at once and never
+/// changes. What is seen before the first keyframe belongs to a stand-in with the id kBeforeFirst.
+///
+/// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped,
+/// and when the open one alone is that large, it takes no more. Memory: 16 bytes per point, and for the open keyframe 9
+/// to 21 bytes per cell beside. With rays followed, 4 bytes per free cell.
 class KeyframeClouds {
  public:
+  static constexpr std::int32_t kBeforeFirst = -1;
+
+  /// The points of a cloud that were new, in the body frame of its keyframe. Valid until the next call.
+  struct Kept {
+    std::int32_t id = 0;
+    std::span<const CloudPoint> points;
+  };
+
   KeyframeClouds(double cell_m, std::size_t max_points);
 
-  /// Starts a keyframe; further scans are added to the keyframe with the highest id. A second cloud for an id that is
-  /// known is ignored, since keyframes may be sent again.
-  void add_keyframe(std::int32_t id, std::span<const CloudPoint> points_body, const Pose& T_odom_keyframe);
+  /// From here on the rays of the scans are followed as well, for the cells that they find free.
+  void follow_rays(FreeSpace free_space) { open_free_ = std::move(free_space); }
 
-  /// Adds a live scan to the newest keyframe. Without any keyframe it is not kept.
-  void add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body);
+  /// Starts a keyframe; further scans are added to the keyframe with the highest id. A keyframe below that was lost on
+  /// its way and sent again: its scans went to its predecessor. `id` is not in store.
+  Kept add_keyframe(std::int32_t id, std::span<const CloudPoint> points_body, const Pose& T_odom_keyframe);
 
-  [[nodiscard]] bool contains(std::int32_t id) const { return entries_.contains(id); }
-  [[nodiscard]] std::size_t size() const { return entries_.size(); }
-  [[nodiscard]] std::size_t points() const;
-  [[nodiscard]] std::size_t bytes() const { return points() * sizeof(CloudPoint) + open_.bytes(); }
-  [[nodiscard]] std::int64_t dropped() const { return dropped_; }
+  /// Adds a live scan to the newest keyframe.
+  Kept add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body);
 
-  /// The cloud of a keyframe as it is now; empty when it was dropped.
-  [[nodiscard]] std::shared_ptr<const std::vector<CloudPoint>> cloud(std::int32_t id) const;
+  /// The farthest clouds, as many as the bound asks to go.
+  [[nodiscard]] std::vector<std::int32_t> beyond_bound() const;
+  void drop(std::span<const std::int32_t> ids);
 
   void clear();
+
+  [[nodiscard]] bool contains(std::int32_t id) const { return entries_.contains(id); }
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+  [[nodiscard]] std::size_t points() const { return closed_points_ + open_points_.size(); }
+  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] std::int64_t dropped() const { return dropped_; }
+
+  /// The keyframe that takes the scans.
+  [[nodiscard]] std::optional<std::int32_t> open_id() const;
+  [[nodiscard]] const Pose& T_odom_keyframe(std::int32_t id) const { return entries_.at(id).T_odom_keyframe; }
+
+  /// A cloud in store.
+  [[nodiscard]] StoredCloud view(std::int32_t id) const;
+
+  /// The same to keep, for another thread; the open one is copied.
+  [[nodiscard]] SharedCloud share(std::int32_t id) const;
 
  private:
   struct Entry {
     Pose T_odom_keyframe;
-    std::shared_ptr<const std::vector<CloudPoint>> points;  // complete unless the keyframe is the newest
+    SharedCloud cloud;  // none while open
   };
 
-  void insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points);
+  std::span<const CloudPoint> insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points,
+                                          bool are_rays);
   void close_newest();
-  void drop_farthest();
 
+  double cell_m_;
   std::size_t max_points_;
   std::map<std::int32_t, Entry> entries_;
-  VoxelLevel open_;  // the newest keyframe's points while scans are still added
+  std::vector<CloudPoint> open_points_;
+  boost::unordered_flat_set<CellKey> open_cells_;
+  std::optional<FreeSpace> open_free_;
+  std::size_t free_cells_ = 0;  // of the closed ones
   std::size_t closed_points_ = 0;
   std::int64_t dropped_ = 0;
 };

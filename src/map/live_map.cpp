@@ -7,14 +7,34 @@ namespace ignis {
 
 ThreeLevelMap rebuild(const RebuildJob& job) {
   ThreeLevelMap map(job.config);
-  map.replace_world(job.clouds, job.T_map_body);
+  std::map<std::int32_t, SharedCloud> store;
+  const ThreeLevelMap::CloudLookup lookup = [&](std::int32_t id) { return view_of(*store.at(id)); };
+  map.set_coarsening(job.coarsening, lookup);
+  map.place_windows(job.centre);
+  // All votes before the first point, so that nothing enters that would be carved.
+  for (const PlacedCloud& cloud : job.clouds) {
+    store[cloud.id] = cloud.cloud;
+    map.add_cloud(cloud.id, cloud.T_map_keyframe);
+    if (cloud.id != job.open_cloud) map.cast_votes(cloud.id, lookup);
+  }
+  for (const PlacedCloud& cloud : job.clouds) {
+    map.insert(cloud.id, cloud.cloud->points);
+    map.stay_within_bound(lookup);
+  }
+  map.set_open_cloud(job.open_cloud);
   return map;
 }
 
 LiveMap::LiveMap(const MapConfig& config)
     : config_(config),
       map_(config),
-      clouds_(config.local_cell_m, static_cast<std::size_t>(config.max_keyframe_points)) {}
+      clouds_(config.local_cell_m, static_cast<std::size_t>(config.max_keyframe_points)) {
+  if (config.carve_free_space) clouds_.follow_rays(FreeSpace(config.mid_cell_m, config.carve_rays));
+}
+
+ThreeLevelMap::CloudLookup LiveMap::lookup() const {
+  return [this](std::int32_t id) { return clouds_.view(id); };
+}
 
 InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
   if (!usable(T_odom_body) || !usable(T_map_odom_ * T_odom_body)) {
@@ -22,15 +42,18 @@ InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const
     return {.rejected = points_body.size()};
   }
   T_odom_body_ = T_odom_body;
-  path_.add(T_odom_body.translation, nodes_.empty() ? -1 : nodes_.rbegin()->first);
-  clouds_.add_scan(points_body, T_odom_body);
-  if (rebuilding_) waiting_.push_back({{points_body.begin(), points_body.end()}, T_odom_body});
-  return map_.insert(points_body, T_map_body());
+  path_.add(T_odom_body.translation, nodes_.empty() ? KeyframeClouds::kBeforeFirst : nodes_.rbegin()->first);
+  map_.follow(T_map_body().translation, lookup());
+  const KeyframeClouds::Kept kept = clouds_.add_scan(points_body, T_odom_body);
+  InsertCounts counts = show(kept);
+  counts.known = points_body.size() - kept.points.size();
+  drop_far_clouds();
+  return counts;
 }
 
 bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   const Pose& T_odom_keyframe = keyframe.state.T_odom_body;
-  if (!usable(T_odom_keyframe) || !usable(T_map_odom_ * T_odom_keyframe)) {
+  if (keyframe.id < 0 || !usable(T_odom_keyframe) || !usable(T_map_odom_ * T_odom_keyframe)) {
     ++refused_poses_;
     return false;
   }
@@ -38,21 +61,49 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   if (node.has_cloud) return true;
   node.has_cloud = true;
   node.T_odom_keyframe = T_odom_keyframe;
-  // The scans around this keyframe were drawn with the correction of that time.
-  node.T_map_drawn = T_map_odom_ * T_odom_keyframe;
-  if (!node.corrected) node.T_map_keyframe = node.T_map_drawn;
-  clouds_.add_keyframe(keyframe.id, keyframe.cloud, T_odom_keyframe);
+  if (!node.corrected) node.T_map_keyframe = T_map_odom_ * T_odom_keyframe;
+  show(clouds_.add_keyframe(keyframe.id, keyframe.cloud, T_odom_keyframe));
+  cast_votes();
+  drop_far_clouds();
+  settle();  // the first keyframe tells where what came before belongs
   return true;
 }
 
-void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses) {
+/// Draws points that a keyframe has just kept.
+InsertCounts LiveMap::show(const KeyframeClouds::Kept& kept) {
+  if (!map_.contains(kept.id)) map_.add_cloud(kept.id, newest_pose(kept.id));
+  map_.set_open_cloud(clouds_.open_id());
+  const InsertCounts counts = map_.insert(kept.id, kept.points);
+  map_.stay_within_bound(lookup());
+  if (rebuilding_) arrivals_.push_back({kept.id, {kept.points.begin(), kept.points.end()}});
+  return counts;
+}
+
+/// Whoever has just been closed says what it found free.
+void LiveMap::cast_votes() {
+  if (!config_.carve_free_space) return;
+  for (const std::int32_t id : map_.cloud_ids()) {
+    if (id != clouds_.open_id() && !map_.has_voted(id)) map_.cast_votes(id, lookup());
+  }
+}
+
+/// Not while a map is being built from them.
+void LiveMap::drop_far_clouds() {
+  if (rebuilding_) return;
+  const std::vector<std::int32_t> ids = clouds_.beyond_bound();
+  if (ids.empty()) return;
+  map_.remove_clouds(ids, lookup());
+  clouds_.drop(ids);
+}
+
+void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision) {
   if (usable(T_map_odom)) {
     T_map_odom_ = T_map_odom;
   } else {
     ++refused_poses_;
   }
   for (const CorrectedPose& pose : poses) {
-    if (!usable(pose.T_map_keyframe)) {
+    if (pose.id < 0 || !usable(pose.T_map_keyframe)) {
       ++refused_poses_;
       continue;
     }
@@ -60,57 +111,89 @@ void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> pos
     node.T_map_keyframe = pose.T_map_keyframe;
     node.corrected = true;
   }
-  corrected_since_loop_ = true;
+  newest_revision_ = revision;
+  settle();
 }
 
-void LiveMap::add_loop(std::int32_t from_id, std::int32_t to_id) {
-  loops_.emplace(from_id, to_id);
-  loop_is_new_ = true;
-  corrected_since_loop_ = false;
+/// Brings the map to the newest poses, or finds that a rebuild has to.
+void LiveMap::settle() {
+  if (rebuilding_) return;
+  std::vector<std::pair<std::int32_t, Pose>> moved;
+  std::vector<std::int32_t> ids;
+  for (const std::int32_t id : map_.cloud_ids()) {
+    const Pose newest = newest_pose(id);
+    if (!differs(newest, map_.pose(id))) continue;
+    moved.emplace_back(id, newest);
+    ids.push_back(id);
+  }
+  needs_rebuild_ =
+      !ids.empty() && map_.cost_of_moving(ids, lookup()) > static_cast<std::size_t>(config_.reanchor_points);
+  if (needs_rebuild_) return;
+  if (!moved.empty()) map_.move_clouds(moved, lookup());
+  reanchored_ += static_cast<std::int64_t>(moved.size());
+  drawn_revision_ = newest_revision_;
 }
 
-void LiveMap::remove_loop(std::int32_t from_id, std::int32_t to_id) { loops_.erase({from_id, to_id}); }
-
-void LiveMap::clear() {
-  const int rebuilds = rebuilds_;
-  const std::int64_t refused = refused_poses_;
-  *this = LiveMap(config_);
-  rebuilds_ = rebuilds;
-  refused_poses_ = refused;
-}
-
-bool LiveMap::moved(const Pose& now, const Pose& drawn) const {
-  return (now.translation - drawn.translation).norm() > config_.rebuild_shift_m ||
-         now.rotation.angularDistance(drawn.rotation) > config_.rebuild_turn_rad;
-}
-
-bool LiveMap::needs_rebuild() const {
-  if (rebuilding_) return false;
-  if (loop_is_new_ && corrected_since_loop_) return true;
-  return std::ranges::any_of(nodes_, [this](const auto& entry) {
-    return entry.second.has_cloud && moved(entry.second.T_map_keyframe, entry.second.T_map_drawn);
-  });
+RebuildJob LiveMap::as_drawn() const {
+  RebuildJob job{.config = config_,
+                 .clouds = {},
+                 .centre = map_.windows().centre,
+                 .coarsening = map_.coarsening(),
+                 .open_cloud = map_.open_cloud()};
+  for (const std::int32_t id : map_.cloud_ids()) job.clouds.push_back({id, clouds_.share(id), map_.pose(id)});
+  return job;
 }
 
 RebuildJob LiveMap::begin_rebuild() {
-  RebuildJob job{.config = config_, .clouds = {}, .T_map_body = T_map_body()};
-  for (auto& [id, node] : nodes_) {
-    if (!node.has_cloud) continue;
-    job.clouds.push_back({id, clouds_.cloud(id), node.T_map_keyframe});
-    node.T_map_drawn = node.T_map_keyframe;
-  }
+  RebuildJob job = as_drawn();
+  job.coarsening = 0;
+  for (PlacedCloud& cloud : job.clouds) cloud.T_map_keyframe = newest_pose(cloud.id);
+  rebuilt_revision_ = newest_revision_;
   rebuilding_ = true;
-  loop_is_new_ = false;
-  waiting_.clear();
+  needs_rebuild_ = false;
+  arrivals_.clear();
   return job;
 }
 
 void LiveMap::finish_rebuild(ThreeLevelMap map) {
+  map.continue_versions(map_);
   map_ = std::move(map);
-  for (const WaitingScan& scan : waiting_) map_.insert(scan.points, T_map_odom_ * scan.T_odom_body);
-  waiting_.clear();
   rebuilding_ = false;
+  for (const Arrival& arrival : std::exchange(arrivals_, {})) {
+    if (!map_.contains(arrival.id)) map_.add_cloud(arrival.id, newest_pose(arrival.id));
+    map_.insert(arrival.id, arrival.points);
+  }
+  map_.set_open_cloud(clouds_.open_id());
+  cast_votes();
+  map_.follow(T_map_body().translation, lookup());
+  map_.stay_within_bound(lookup());
+  drawn_revision_ = rebuilt_revision_;
   ++rebuilds_;
+  settle();
+  drop_far_clouds();
+}
+
+void LiveMap::clear() {
+  ThreeLevelMap empty(config_);
+  empty.continue_versions(map_);
+  map_ = std::move(empty);
+  clouds_.clear();
+  path_.clear();
+  nodes_.clear();
+  loops_.clear();
+  T_map_odom_ = T_odom_body_ = Pose{};
+  newest_revision_ = drawn_revision_ = 0;
+  needs_rebuild_ = rebuilding_ = false;
+  arrivals_.clear();
+}
+
+void LiveMap::add_loop(std::int32_t from_id, std::int32_t to_id) { loops_.emplace(from_id, to_id); }
+
+void LiveMap::remove_loop(std::int32_t from_id, std::int32_t to_id) { loops_.erase({from_id, to_id}); }
+
+bool LiveMap::differs(const Pose& a, const Pose& b) const {
+  return (a.translation - b.translation).norm() > config_.rebuild_shift_m ||
+         a.rotation.angularDistance(b.rotation) > config_.rebuild_turn_rad;
 }
 
 Pose LiveMap::T_map_odom_at(std::int32_t keyframe_id) const {
@@ -119,23 +202,43 @@ Pose LiveMap::T_map_odom_at(std::int32_t keyframe_id) const {
   return found->second.T_map_keyframe * found->second.T_odom_keyframe.inverse();
 }
 
-std::vector<Eigen::Vector3f> LiveMap::corrected_path() const {
-  return path_.corrected([this](std::int32_t id) {
-    // What was driven before the first keyframe arrived belongs to that keyframe.
-    return T_map_odom_at(id < 0 && !nodes_.empty() ? nodes_.begin()->first : id);
-  });
+/// Where a cloud belongs. What was seen before the first keyframe goes with that keyframe.
+Pose LiveMap::newest_pose(std::int32_t cloud_id) const {
+  if (cloud_id >= 0) return nodes_.at(cloud_id).T_map_keyframe;
+  return T_map_odom_at(nodes_.empty() ? cloud_id : nodes_.begin()->first) * clouds_.T_odom_keyframe(cloud_id);
 }
 
-std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> LiveMap::loop_edges() const {
-  std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> edges;
+std::vector<Eigen::Vector3f> LiveMap::corrected_path() const {
+  return path_.corrected(
+      [this](std::int32_t id) { return T_map_odom_at(id < 0 && !nodes_.empty() ? nodes_.begin()->first : id); });
+}
+
+std::vector<LoopEdge> LiveMap::loop_edges() const {
+  std::vector<LoopEdge> edges;
   for (const auto& [from_id, to_id] : loops_) {
     const auto from = nodes_.find(from_id);
     const auto to = nodes_.find(to_id);
     if (from == nodes_.end() || to == nodes_.end()) continue;
-    edges.emplace_back(from->second.T_map_keyframe.translation.cast<float>(),
-                       to->second.T_map_keyframe.translation.cast<float>());
+    edges.push_back({from->second.T_map_keyframe.translation.cast<float>(),
+                     to->second.T_map_keyframe.translation.cast<float>(), from_id, to_id});
   }
   return edges;
+}
+
+std::vector<std::pair<std::int32_t, Eigen::Vector3f>> LiveMap::keyframe_positions() const {
+  std::vector<std::pair<std::int32_t, Eigen::Vector3f>> positions;
+  for (const auto& [id, node] : nodes_) positions.emplace_back(id, node.T_map_keyframe.translation.cast<float>());
+  return positions;
+}
+
+std::vector<Eigen::Vector3f> LiveMap::placed_cloud(std::int32_t id) const {
+  std::vector<Eigen::Vector3f> points;
+  if (id < 0 || !clouds_.contains(id)) return points;
+  const Pose T_map_keyframe = newest_pose(id);
+  for (const CloudPoint& point : clouds_.view(id).points) {
+    points.emplace_back((T_map_keyframe * Eigen::Vector3d(point.position.cast<double>())).cast<float>());
+  }
+  return points;
 }
 
 std::vector<std::int32_t> LiveMap::missing_keyframes(std::int32_t count) const {

@@ -11,6 +11,7 @@
 #include "common/keyframe.h"
 #include "map/driven_path.h"
 #include "map/keyframe_clouds.h"
+#include "map/map_picture.h"
 #include "map/three_level_map.h"
 
 namespace ignis {
@@ -21,25 +22,38 @@ struct CorrectedPose {
   Pose T_map_keyframe;
 };
 
-/// Everything a rebuild needs, shared or copied, so that it can run on another thread.
+/// A cloud and where it belongs.
+struct PlacedCloud {
+  std::int32_t id = 0;
+  SharedCloud cloud;
+  Pose T_map_keyframe;
+};
+
+/// Everything that the map is a function of, shared or copied, so that it can be built on another thread.
 struct RebuildJob {
   MapConfig config;
-  std::vector<PlacedCloud> clouds;  ///< ascending keyframe ids
-  Pose T_map_body;                  ///< around which the windows lie
+  std::vector<PlacedCloud> clouds;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the windows [m, map]
+  int coarsening = 0;                                ///< at least
+  std::optional<std::int32_t> open_cloud;
 };
 
 /// Builds the map of a job: the same voxels on any thread and after any history.
 [[nodiscard]] ThreeLevelMap rebuild(const RebuildJob& job);
 
-/// The voxel map of a drive: live scans enter it where odometry and the current correction place them; when the back
-/// end has moved the keyframes, it is rebuilt from their clouds. Frames: `odom` of the front end, `map` of the back
-/// end.
+/// The voxel map of a drive. Frames: `odom` of the front end, `map` of the back end.
 ///
-/// A rebuild is begun (begin_rebuild), run anywhere (rebuild) and taken over (finish_rebuild). Meanwhile the old map
-/// stays in use; scans and keyframes that arrive between are added to the new one. Not thread-safe, no clocks.
+/// Invariant: the map equals rebuild(as_drawn()) at any time, voxel for voxel: scans enter it as the points that their
+/// keyframe keeps, at the keyframe's pose; when the back end moves keyframes, what they leave and where they arrive is
+/// filled from the clouds again, at once if that reads no more than `reanchor_points`. A larger correction is built
+/// aside: begun (begin_rebuild), run anywhere (rebuild) and taken over (finish_rebuild). Meanwhile the map stays in use
+/// as it is, and what arrives is added to both. Not thread-safe, no clocks.
 class LiveMap {
  public:
   explicit LiveMap(const MapConfig& config);
+  // The map asks this object for clouds.
+  LiveMap(const LiveMap&) = delete;
+  LiveMap& operator=(const LiveMap&) = delete;
 
   /// A scan in the body frame. Returns what became of its points.
   InsertCounts insert_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body);
@@ -49,32 +63,40 @@ class LiveMap {
 
   /// The back end's newest state: poses that moved and the correction of odom. Poses that no map can hold are ignored
   /// and counted.
-  void correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses);
+  void correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision = 0);
 
-  /// A loop factor entered or left the graph. One that entered makes the next correction rebuild the map.
   void add_loop(std::int32_t from_id, std::int32_t to_id);
   void remove_loop(std::int32_t from_id, std::int32_t to_id);
 
   /// Forgets everything: the front end started a new session, in a new odom frame.
   void clear();
 
-  /// True when a keyframe stands farther from where the map has it than the configuration allows.
-  [[nodiscard]] bool needs_rebuild() const;
+  /// True when keyframes have moved by more than is worth doing at once.
+  [[nodiscard]] bool needs_rebuild() const { return needs_rebuild_ && !rebuilding_; }
 
   [[nodiscard]] RebuildJob begin_rebuild();
   void finish_rebuild(ThreeLevelMap map);
   [[nodiscard]] bool rebuilding() const { return rebuilding_; }
 
+  /// What the map shows now: the clouds where it has them.
+  [[nodiscard]] RebuildJob as_drawn() const;
+
   [[nodiscard]] const ThreeLevelMap& voxels() const { return map_; }
   [[nodiscard]] const KeyframeClouds& clouds() const { return clouds_; }
+  [[nodiscard]] const Pose& T_map_odom() const { return T_map_odom_; }
   [[nodiscard]] Pose T_map_body() const { return T_map_odom_ * T_odom_body_; }
+  [[nodiscard]] std::int32_t revision() const { return drawn_revision_; }  ///< that the voxels stand on
   [[nodiscard]] int rebuilds() const { return rebuilds_; }
+  [[nodiscard]] std::int64_t reanchored() const { return reanchored_; }  ///< keyframes moved without a rebuild
   [[nodiscard]] std::int64_t refused_poses() const { return refused_poses_; }
 
   [[nodiscard]] std::vector<Eigen::Vector3f> odometry_path() const { return path_.odometry(); }
   [[nodiscard]] std::vector<Eigen::Vector3f> corrected_path() const;
-  /// Both ends of every loop [m, map].
-  [[nodiscard]] std::vector<std::pair<Eigen::Vector3f, Eigen::Vector3f>> loop_edges() const;
+  [[nodiscard]] std::vector<LoopEdge> loop_edges() const;
+  /// Where the keyframes stand [m, map], ascending ids.
+  [[nodiscard]] std::vector<std::pair<std::int32_t, Eigen::Vector3f>> keyframe_positions() const;
+  /// The cloud of a keyframe at its corrected pose [m, map]; empty when it is not in store.
+  [[nodiscard]] std::vector<Eigen::Vector3f> placed_cloud(std::int32_t id) const;
 
   /// Keyframe ids below `count` whose cloud never arrived.
   [[nodiscard]] std::vector<std::int32_t> missing_keyframes(std::int32_t count) const;
@@ -83,17 +105,22 @@ class LiveMap {
   struct Node {
     Pose T_odom_keyframe;
     Pose T_map_keyframe;  // newest
-    Pose T_map_drawn;     // where the map has its points
     bool has_cloud = false;
     bool corrected = false;
   };
-  struct WaitingScan {
+  struct Arrival {
+    std::int32_t id;
     std::vector<CloudPoint> points;
-    Pose T_odom_body;
   };
 
   [[nodiscard]] Pose T_map_odom_at(std::int32_t keyframe_id) const;
-  [[nodiscard]] bool moved(const Pose& now, const Pose& drawn) const;
+  [[nodiscard]] Pose newest_pose(std::int32_t cloud_id) const;
+  [[nodiscard]] bool differs(const Pose& a, const Pose& b) const;
+  [[nodiscard]] ThreeLevelMap::CloudLookup lookup() const;
+  InsertCounts show(const KeyframeClouds::Kept& kept);
+  void cast_votes();
+  void drop_far_clouds();
+  void settle();
 
   MapConfig config_;
   ThreeLevelMap map_;
@@ -103,11 +130,14 @@ class LiveMap {
   std::set<std::pair<std::int32_t, std::int32_t>> loops_;
   Pose T_map_odom_;
   Pose T_odom_body_;
-  bool loop_is_new_ = false;
-  bool corrected_since_loop_ = false;
+  std::int32_t newest_revision_ = 0;
+  std::int32_t drawn_revision_ = 0;
+  std::int32_t rebuilt_revision_ = 0;  // that the rebuild under way will show
+  bool needs_rebuild_ = false;
   bool rebuilding_ = false;
-  std::vector<WaitingScan> waiting_;  // arrived while a rebuild was running
+  std::vector<Arrival> arrivals_;  // since the rebuild under way began
   int rebuilds_ = 0;
+  std::int64_t reanchored_ = 0;
   std::int64_t refused_poses_ = 0;
 };
 

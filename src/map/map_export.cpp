@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map/map_export.h"
 
-#include <algorithm>
 #include <cstring>
 #include <format>
 #include <limits>
@@ -12,6 +11,7 @@
 #include <pcl/io/ply_io.h>
 
 #include "common/file_output.h"
+#include "map/picture_builder.h"
 
 namespace ignis {
 namespace {
@@ -41,11 +41,13 @@ pcl::PCLPointCloud2 to_cloud(const ThreeLevelMap& map) {
   cloud.fields = {field("x", 0, pcl::PCLPointField::FLOAT32), field("y", 4, pcl::PCLPointField::FLOAT32),
                   field("z", 8, pcl::PCLPointField::FLOAT32), field("intensity", 12, pcl::PCLPointField::FLOAT32),
                   field("level", 16, pcl::PCLPointField::UINT8)};
-  MapView view = map.view(std::numeric_limits<double>::infinity());
+  const MapPicture everything = PictureBuilder(std::numeric_limits<double>::infinity()).build(map);
   for (std::size_t i = 0; i < kLevels; ++i) {
-    std::ranges::sort(view[i].voxels, {}, &ViewVoxel::cell);
-    for (const ViewVoxel& voxel : view[i].voxels) {
-      append(*map.level(i).find(voxel.cell), static_cast<std::uint8_t>(i), cloud.data);
+    for (const SharedTilePicture& tile : everything.tiles) {
+      for (const std::uint64_t voxel : tile->voxels[i]) {
+        const CellIndex cell = map.grid().world_cell(i, tile->tile, TileVoxel::cell(voxel));
+        append(*map.find(i, cell), static_cast<std::uint8_t>(i), cloud.data);
+      }
     }
   }
   cloud.point_step = kPointStep;

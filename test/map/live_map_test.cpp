@@ -22,14 +22,13 @@ Keyframe keyframe(std::int32_t id, const Pose& T_odom_body, std::vector<CloudPoi
 }
 
 /// Ten keyframes 2 m apart, with live scans around each.
-LiveMap driven_map(std::mt19937& generator) {
-  LiveMap map(MapConfig{});
+void drive(LiveMap& map, std::uint32_t seed) {
+  std::mt19937 generator(seed);
   for (int id = 0; id < 10; ++id) {
     const Pose pose = pose_at(2.0 * id, 0, 0);
     map.add_keyframe(keyframe(id, pose, random_cloud(generator, 100, 8, 3)));
     map.insert_scan(random_cloud(generator, 300, 8, 3), pose);
   }
-  return map;
 }
 
 std::vector<CorrectedPose> shifted_keyframes(double shift_z) {
@@ -38,90 +37,121 @@ std::vector<CorrectedPose> shifted_keyframes(double shift_z) {
   return poses;
 }
 
+MapConfig rebuilding_aside() {
+  MapConfig config;
+  config.reanchor_points = 0;
+  return config;
+}
+
+std::string fresh_fingerprint(const LiveMap& map) { return rebuild(map.as_drawn()).fingerprint(); }
+
 void run_rebuild(LiveMap& map) { map.finish_rebuild(rebuild(map.begin_rebuild())); }
+
+bool shows(const LiveMap& map, const Eigen::Vector3d& p) {
+  return map.voxels().find(0, map.voxels().locator().cell_of(0, p)).has_value();
+}
 
 TEST(LiveMap, PlacesScansByTheCurrentCorrection) {
   LiveMap map(MapConfig{});
   map.correct(pose_at(100, 0, 50, 0.5), {});
   const CloudPoint point{{1.0F, 0.0F, -2.0F}, 9.0F};
   map.insert_scan(std::span(&point, 1), pose_at(3, 0, 4));
-  const Eigen::Vector3d expected = pose_at(100, 0, 50, 0.5) * (pose_at(3, 0, 4) * Eigen::Vector3d(1, 0, -2));
-  EXPECT_TRUE(map.voxels().level(0).contains(map.voxels().level(0).cell_of(expected)));
+  EXPECT_TRUE(shows(map, pose_at(100, 0, 50, 0.5) * (pose_at(3, 0, 4) * Eigen::Vector3d(1, 0, -2))));
 }
 
-TEST(LiveMap, AsksForARebuildOnceAKeyframeMovedMoreThanTheThreshold) {
-  std::mt19937 generator(1);
-  LiveMap map = driven_map(generator);
-  map.correct(Pose{}, shifted_keyframes(0.005));
-  EXPECT_FALSE(map.needs_rebuild()) << "4.5 cm is below the threshold";
-  map.correct(Pose{}, shifted_keyframes(0.006));
+TEST(LiveMap, FollowsEveryCorrectionAtOnceWhenItIsSmall) {
+  LiveMap map(MapConfig{});
+  drive(map, 1);
+  map.correct(Pose{}, shifted_keyframes(0.02), 7);
+  EXPECT_FALSE(map.needs_rebuild());
+  EXPECT_EQ(map.revision(), 7);
+  EXPECT_EQ(map.reanchored(), 9) << "the first one stays";
+  EXPECT_EQ(map.voxels().pose(9).translation.z(), 0.02 * 9);
+  EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
+}
+
+TEST(LiveMap, LeavesKeyframesWhoseCorrectionIsBelowTheThreshold) {
+  LiveMap map(MapConfig{});
+  drive(map, 1);
+  map.correct(Pose{}, shifted_keyframes(0.0005));
+  EXPECT_EQ(map.reanchored(), 0) << "4.5 mm at most";
+  map.correct(Pose{}, shifted_keyframes(0.0006));
+  EXPECT_EQ(map.reanchored(), 1) << "the ninth has 5.4 mm";
+}
+
+TEST(LiveMap, AsksForARebuildWhenACorrectionIsLarge) {
+  LiveMap map(rebuilding_aside());
+  drive(map, 2);
+  const std::string before = map.voxels().fingerprint();
+  map.correct(Pose{}, shifted_keyframes(0.1), 3);
   EXPECT_TRUE(map.needs_rebuild());
+  EXPECT_EQ(map.voxels().fingerprint(), before);
+  EXPECT_EQ(map.revision(), 0) << "the voxels stand on the old revision still";
   run_rebuild(map);
   EXPECT_FALSE(map.needs_rebuild());
   EXPECT_EQ(map.rebuilds(), 1);
+  EXPECT_EQ(map.revision(), 3);
+  EXPECT_NE(map.voxels().fingerprint(), before);
+  EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
 }
 
-TEST(LiveMap, RebuildsAfterAnAcceptedLoopAsSoonAsItsCorrectionIsIn) {
-  std::mt19937 generator(2);
-  LiveMap map = driven_map(generator);
-  map.add_loop(9, 0);
-  EXPECT_FALSE(map.needs_rebuild());
-  map.correct(Pose{}, shifted_keyframes(0.001));
-  EXPECT_TRUE(map.needs_rebuild());
-  run_rebuild(map);
-  EXPECT_FALSE(map.needs_rebuild());
+TEST(LiveMap, TheWayToAMapDoesNotMatter) {
+  LiveMap at_once(MapConfig{});
+  LiveMap aside(rebuilding_aside());
+  drive(at_once, 3);
+  drive(aside, 3);
+  at_once.correct(pose_at(0, 0, 0.9), shifted_keyframes(0.1));
+  aside.correct(pose_at(0, 0, 4.5), shifted_keyframes(0.5));
+  const RebuildJob outdated = aside.begin_rebuild();
+  aside.correct(pose_at(0, 0, 0.9), shifted_keyframes(0.1));
+  EXPECT_FALSE(aside.needs_rebuild()) << "one rebuild at a time";
+  aside.finish_rebuild(rebuild(outdated));
+  EXPECT_TRUE(aside.needs_rebuild()) << "the second correction came during the rebuild";
+  run_rebuild(aside);
+  const std::vector<CloudPoint> nothing;
+  at_once.insert_scan(nothing, pose_at(18, 0, 0));
+  aside.insert_scan(nothing, pose_at(18, 0, 0));
+  EXPECT_EQ(at_once.voxels().fingerprint(), aside.voxels().fingerprint());
 }
 
-TEST(LiveMap, ARebuiltMapEqualsOneFromAnotherHistoryWithTheSameKeyframes) {
-  std::mt19937 generator(3);
-  LiveMap map = driven_map(generator);
-  LiveMap twice = map;
-  map.correct(pose_at(0, 0, 0.9), shifted_keyframes(0.1));
-  run_rebuild(map);
-  twice.correct(pose_at(0, 0, 4.5), shifted_keyframes(0.5));
-  const RebuildJob outdated = twice.begin_rebuild();
-  twice.correct(pose_at(0, 0, 0.9), shifted_keyframes(0.1));
-  EXPECT_FALSE(twice.needs_rebuild()) << "one rebuild at a time";
-  twice.finish_rebuild(rebuild(outdated));
-  EXPECT_TRUE(twice.needs_rebuild()) << "the second correction came during the rebuild";
-  run_rebuild(twice);
-  EXPECT_EQ(map.voxels().fingerprint(), twice.voxels().fingerprint());
-}
-
-TEST(LiveMap, ARebuildKeepsTheDetailOfTheLiveScans) {
-  std::mt19937 generator(4);
-  LiveMap map = driven_map(generator);
-  const std::size_t before = map.voxels().size();
-  map.add_loop(9, 0);
-  map.correct(Pose{}, shifted_keyframes(0.0));
-  run_rebuild(map);
-  // All of what the scans showed, and the keyframes' own clouds on top.
-  EXPECT_GT(map.voxels().size(), before);
-}
-
-TEST(LiveMap, ScansThatArriveDuringARebuildAreInTheNewMap) {
-  std::mt19937 generator(5);
-  LiveMap map = driven_map(generator);
+TEST(LiveMap, ScansThatArriveDuringARebuildAreInBothMaps) {
+  LiveMap map(rebuilding_aside());
+  drive(map, 5);
   const RebuildJob job = map.begin_rebuild();
   const CloudPoint point{{0.0F, 4.5F, 0.0F}, 1.0F};
   map.insert_scan(std::span(&point, 1), pose_at(18, 0, 0));
-  const VoxelLevel& local = map.voxels().level(0);
-  const CellIndex cell = local.cell_of({18.0, 4.5, 0.0});
-  EXPECT_TRUE(local.contains(cell)) << "the old map goes on while the new one is built";
+  EXPECT_TRUE(shows(map, {18.0, 4.5, 0.0})) << "the old map goes on while the new one is built";
+  map.add_keyframe(keyframe(10, pose_at(20, 0, 0)));
+  map.insert_scan(std::span(&point, 1), pose_at(20, 0, 0));
   map.finish_rebuild(rebuild(job));
-  EXPECT_TRUE(map.voxels().level(0).contains(cell));
+  EXPECT_TRUE(shows(map, {18.0, 4.5, 0.0}));
+  EXPECT_TRUE(shows(map, {20.0, 4.5, 0.0}));
+  EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
 }
 
-TEST(LiveMap, VoxelsOfARebuiltMapCarryTheirKeyframe) {
-  std::mt19937 generator(6);
-  LiveMap map = driven_map(generator);
-  run_rebuild(map);
-  map.voxels().level(0).for_each([](const CellIndex&, const MapPoint& point) { EXPECT_GE(point.keyframe_id, 0); });
+TEST(LiveMap, WhatCameBeforeTheFirstKeyframeMovesWithIt) {
+  LiveMap map(MapConfig{});
+  const CloudPoint point{{0.0F, 1.0F, -2.0F}, 1.0F};
+  map.insert_scan(std::span(&point, 1), pose_at(0, 0, 0));
+  EXPECT_TRUE(shows(map, {0, 1, -2})) << "shown at once";
+  map.add_keyframe(keyframe(0, pose_at(1, 0, 0)));
+  const CorrectedPose moved{0, pose_at(1, 0, 3)};
+  map.correct(pose_at(0, 0, 3), std::span(&moved, 1));
+  EXPECT_TRUE(shows(map, {0, 1, 1}));
+  EXPECT_FALSE(shows(map, {0, 1, -2}));
 }
 
-TEST(LiveMap, PathsAndLoopEdgesFollowTheCorrection) {
-  std::mt19937 generator(7);
-  LiveMap map = driven_map(generator);
+TEST(LiveMap, OnlyTheNewestKeyframeIsOpen) {
+  LiveMap map(MapConfig{});
+  drive(map, 6);
+  EXPECT_EQ(map.voxels().open_cloud(), 9);
+  map.add_keyframe(keyframe(10, pose_at(20, 0, 0)));
+  EXPECT_EQ(map.voxels().open_cloud(), 10);
+}
+
+TEST(LiveMap, PathsLoopEdgesAndKeyframesFollowTheCorrection) {
+  LiveMap map(MapConfig{});
+  drive(map, 7);
   map.add_loop(9, 0);
   map.correct(pose_at(0, 0, 0.9), shifted_keyframes(0.1));
   const auto odometry = map.odometry_path();
@@ -131,22 +161,39 @@ TEST(LiveMap, PathsAndLoopEdgesFollowTheCorrection) {
   EXPECT_FLOAT_EQ(odometry.back().z(), 0.0F);
   EXPECT_NEAR(corrected.back().z(), 0.9F, 1e-5);
   ASSERT_EQ(map.loop_edges().size(), 1U);
-  EXPECT_NEAR(map.loop_edges()[0].first.z(), 0.9F, 1e-5);
+  EXPECT_NEAR(map.loop_edges()[0].from.z(), 0.9F, 1e-5);
+  EXPECT_EQ(map.loop_edges()[0].from_id, 9);
+  ASSERT_EQ(map.keyframe_positions().size(), 10U);
+  EXPECT_NEAR(map.keyframe_positions()[9].second.z(), 0.9F, 1e-5);
   map.remove_loop(9, 0);
   EXPECT_TRUE(map.loop_edges().empty());
 }
 
+TEST(LiveMap, GivesTheCloudOfAKeyframeWhereItBelongs) {
+  LiveMap map(MapConfig{});
+  const std::vector<CloudPoint> cloud = {{{1.0F, 0.0F, 0.0F}, 1.0F}};
+  map.add_keyframe(keyframe(0, pose_at(5, 0, 0), cloud));
+  const CorrectedPose moved{0, pose_at(5, 0, 2)};
+  map.correct(Pose{}, std::span(&moved, 1));
+  ASSERT_EQ(map.placed_cloud(0).size(), 1U);
+  EXPECT_LT((map.placed_cloud(0)[0] - Eigen::Vector3f(6, 0, 2)).norm(), 1e-5F);
+  EXPECT_TRUE(map.placed_cloud(1).empty());
+  EXPECT_TRUE(map.placed_cloud(-1).empty());
+}
+
 TEST(LiveMap, RefusesUnusablePosesAndCountsThem) {
+  LiveMap map(MapConfig{});
+  drive(map, 8);
   std::mt19937 generator(8);
-  LiveMap map = driven_map(generator);
   const std::string before = map.voxels().fingerprint();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<CloudPoint> cloud = random_cloud(generator, 10, 5, 2);
   EXPECT_EQ(map.insert_scan(cloud, pose_at(nan, 0, 0)).rejected, 10U);
   EXPECT_FALSE(map.add_keyframe(keyframe(10, pose_at(1e7, 0, 0))));
-  const CorrectedPose bad{3, pose_at(0, nan, 0)};
-  map.correct(pose_at(1e9, 0, 0), std::span(&bad, 1));
-  EXPECT_EQ(map.refused_poses(), 4);
+  EXPECT_FALSE(map.add_keyframe(keyframe(-1, pose_at(0, 0, 0))));
+  const CorrectedPose bad[] = {{3, pose_at(0, nan, 0)}, {-1, pose_at(0, 0, 0)}};
+  map.correct(pose_at(1e9, 0, 0), bad);
+  EXPECT_EQ(map.refused_poses(), 6);
   EXPECT_FALSE(map.needs_rebuild());
   EXPECT_EQ(map.voxels().fingerprint(), before);
 }
@@ -160,8 +207,8 @@ TEST(LiveMap, NamesTheKeyframesThatNeverCame) {
 }
 
 TEST(LiveMap, ClearForgetsTheDriveButNotTheCounts) {
-  std::mt19937 generator(9);
-  LiveMap map = driven_map(generator);
+  LiveMap map(MapConfig{});
+  drive(map, 9);
   run_rebuild(map);
   map.clear();
   EXPECT_EQ(map.voxels().size(), 0U);

@@ -10,6 +10,7 @@
 #include <pcl/io/ply_io.h>
 #include <pcl/point_types.h>
 
+#include "map/picture_builder.h"
 #include "map/random_clouds.h"
 
 namespace ignis {
@@ -22,7 +23,8 @@ class MapExport : public ::testing::Test {
               ("map_export_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     std::filesystem::create_directories(folder_);
     std::mt19937 generator(1);
-    map_.insert(test::random_cloud(generator, 5'000, 40.0, 4.0), test::pose_at(3, 1, 2, 0.4));
+    map_.add_cloud(0, test::pose_at(3, 1, 2, 0.4));
+    map_.insert(0, test::random_cloud(generator, 5'000, 40.0, 4.0));
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
@@ -30,15 +32,15 @@ class MapExport : public ::testing::Test {
     std::vector<std::string> names;
     for (const auto& field : file.fields) names.push_back(field.name);
     EXPECT_EQ(names, (std::vector<std::string>{"x", "y", "z", "intensity", "level"}));
-    const MapView view = map_.view(std::numeric_limits<double>::infinity());
-    ASSERT_EQ(file.width * file.height, view[0].voxels.size() + view[1].voxels.size() + view[2].voxels.size());
+    const MapPicture shown = PictureBuilder(std::numeric_limits<double>::infinity()).build(map_);
+    ASSERT_EQ(file.width * file.height, shown.counts[0] + shown.counts[1] + shown.counts[2]);
     pcl::PointCloud<pcl::PointXYZI> points;
     pcl::fromPCLPointCloud2(file, points);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto level = static_cast<std::size_t>(file.data[i * file.point_step + file.fields[4].offset]);
       ASSERT_LT(level, kLevels);
       const Eigen::Vector3d p = points[i].getVector3fMap().cast<double>();
-      const auto found = map_.level(level).find(map_.level(level).cell_of(p));
+      const auto found = map_.find(level, map_.locator().cell_of(level, p));
       ASSERT_TRUE(found);
       EXPECT_LT((found->p_world - p).norm(), 1e-5);
       EXPECT_FLOAT_EQ(found->intensity, points[i].intensity);
@@ -68,7 +70,8 @@ TEST_F(MapExport, EqualMapsGiveEqualFiles) {
   std::mt19937 generator(1);
   auto cloud = test::random_cloud(generator, 5'000, 40.0, 4.0);
   std::ranges::reverse(cloud);
-  other.insert(cloud, test::pose_at(3, 1, 2, 0.4));
+  other.add_cloud(0, test::pose_at(3, 1, 2, 0.4));
+  other.insert(0, cloud);
   const auto content = [](const std::filesystem::path& file) {
     std::ifstream stream(file, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(stream), {});

@@ -2,211 +2,222 @@
 #include "map/three_level_map.h"
 
 #include <limits>
-#include <set>
 
 #include <gtest/gtest.h>
 
+#include "map/map_oracle.h"
 #include "map/random_clouds.h"
 
 namespace ignis {
 namespace {
 
+using test::oracle_levels;
 using test::pose_at;
 using test::random_cloud;
 
-double horizontal(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::hypot(a.x() - b.x(), a.z() - b.z());
-}
-
-TEST(ThreeLevelMap, PutsAScanWithinTheLocalWindowIntoTheLocalLevelAlone) {
-  std::mt19937 generator(1);
-  ThreeLevelMap map(MapConfig{});
-  const InsertCounts counts = map.insert(random_cloud(generator, 5'000, 9.9, 4.9), pose_at(3, 1, -2, 0.7));
-  EXPECT_EQ(counts.inserted, 5'000U);
-  EXPECT_GT(map.level(0).size(), 4'000U);
-  EXPECT_EQ(map.level(1).size(), 0U);
-  EXPECT_EQ(map.level(2).size(), 0U);
-}
-
-TEST(ThreeLevelMap, EveryPointInsideTheWindowsHasAVoxelOnTheLevelOfItsDistance) {
-  std::mt19937 generator(2);
-  const Pose pose = pose_at(5, 0, 5, -1.0);
-  const std::vector<CloudPoint> cloud = random_cloud(generator, 20'000, 120.0, 6.0);
-  ThreeLevelMap map(MapConfig{});
-  const InsertCounts counts = map.insert(cloud, pose);
-  std::size_t outside = 0;
-  for (const CloudPoint& point : cloud) {
-    const Eigen::Vector3d p = pose * Eigen::Vector3d(point.position.cast<double>());
-    const double distance = horizontal(p, pose.translation);
-    const std::size_t level = distance <= 10.0 ? 0 : distance <= 30.0 ? 1 : 2;
-    if (distance > 100.0 || std::abs(p.y()) > 5.0) {
-      ++outside;
-    } else {
-      EXPECT_TRUE(map.level(level).contains(map.level(level).cell_of(p)));
-    }
-  }
-  EXPECT_EQ(counts.outside, outside);
-  EXPECT_EQ(counts.inserted + outside, cloud.size());
-}
-
-TEST(ThreeLevelMap, LosesNothingInsideTheCoarseWindowWhileDrivingAndKeepsEachLevelInItsWindow) {
-  std::mt19937 generator(3);
+/// Clouds in a store, as LiveMap keeps them, and the map of them.
+struct World {
   MapConfig config;
-  config.coarse_window_m = 40.0;
-  ThreeLevelMap map(config);
-  std::vector<Eigen::Vector3d> seen;
-  for (int step = 0; step <= 60; ++step) {
-    const Pose pose = pose_at(step, 0, 0.3 * step, 0.1 * step);
-    for (const CloudPoint& point : random_cloud(generator, 200, 12.0, 4.0)) {
-      map.insert(std::span(&point, 1), pose);
-      seen.push_back(pose * Eigen::Vector3d(point.position.cast<double>()));
-    }
+  std::map<std::int32_t, std::vector<CloudPoint>> store;
+  ThreeLevelMap map{config};
+
+  explicit World(const MapConfig& c = {}) : config(c), map(c) {}
+
+  [[nodiscard]] ThreeLevelMap::CloudLookup lookup() const {
+    return [this](std::int32_t id) { return StoredCloud{store.at(id), {}}; };
   }
-  const double windows[] = {config.local_window_m, config.mid_window_m, config.coarse_window_m};
+  InsertCounts add(std::int32_t id, std::vector<CloudPoint> points, const Pose& pose) {
+    store[id] = std::move(points);
+    map.add_cloud(id, pose);
+    return map.insert(id, store[id]);
+  }
+  [[nodiscard]] RebuildJob job() const {
+    RebuildJob job{.config = config,
+                   .clouds = {},
+                   .centre = map.windows().centre,
+                   .coarsening = map.coarsening(),
+                   .open_cloud = {}};
+    for (const auto& [id, points] : store) {
+      job.clouds.push_back({id, std::make_shared<const CloudData>(CloudData{points, {}}), map.pose(id)});
+    }
+    return job;
+  }
+};
+
+void expect_equals_oracle(const World& world) {
+  const auto levels = oracle_levels(world.job());
   for (std::size_t i = 0; i < kLevels; ++i) {
-    EXPECT_GT(map.level(i).size(), 0U);
-    map.level(i).for_each([&](const CellIndex&, const MapPoint& point) {
-      EXPECT_LE(horizontal(point.p_world, map.centre()), windows[i]);
-    });
-  }
-  std::size_t forgotten = 0;
-  for (const Eigen::Vector3d& p : seen) {
-    bool found = false;
-    for (std::size_t i = 0; i < kLevels; ++i) found = found || map.level(i).contains(map.level(i).cell_of(p));
-    // A cell on the rim may go with its representative although this point of it still lies inside.
-    if (horizontal(p, map.centre()) < config.coarse_window_m - 1.0) {
-      EXPECT_TRUE(found) << p.transpose();
+    const auto voxels = world.map.sorted(i);
+    ASSERT_EQ(voxels.size(), levels[i].size()) << "level " << i;
+    auto expected = levels[i].begin();
+    for (const auto& [cell, point] : voxels) {
+      ASSERT_EQ(cell, expected->first);
+      const Eigen::Vector3d centre = test::cell_centre(cell, world.map.grid().cell_m[i]);
+      EXPECT_EQ(point.p_world, centre + expected->second.from_centre.cast<double>());
+      EXPECT_EQ(point.keyframe_id, expected->second.keyframe_id);
+      EXPECT_EQ(point.intensity, expected->second.intensity);
+      ++expected;
     }
-    if (!found) ++forgotten;
   }
-  EXPECT_GT(forgotten, 0U) << "the coarse window was never left";
+}
+
+World random_world(std::uint32_t seed, int clouds, std::size_t points) {
+  std::mt19937 generator(seed);
+  World world;
+  world.map.place_windows({5.0, 0.5, -3.0});
+  for (int id = 0; id < clouds; ++id) {
+    const auto along = static_cast<double>(generator() % 60);
+    world.add(id, random_cloud(generator, points, 14.0, 6.0), pose_at(along - 30.0, 0.02 * id, -0.5 * along, 0.3 * id));
+  }
+  return world;
+}
+
+TEST(ThreeLevelMap, HoldsOnEveryLevelThePointNearestTheCentreOfEveryCellInItsWindow) {
+  const World world = random_world(1, 8, 3'000);
+  for (std::size_t i = 0; i < kLevels; ++i) EXPECT_GT(world.map.sorted(i).size(), 100U);
+  expect_equals_oracle(world);
+}
+
+TEST(ThreeLevelMap, DoesNotDependOnTheOrderOfInsertion) {
+  World world = random_world(2, 6, 2'000);
+  World other;
+  other.map.place_windows(world.map.windows().centre);
+  for (auto cloud = world.store.rbegin(); cloud != world.store.rend(); ++cloud) {
+    std::vector<CloudPoint> reversed(cloud->second.rbegin(), cloud->second.rend());
+    other.add(cloud->first, std::move(reversed), world.map.pose(cloud->first));
+  }
+  EXPECT_EQ(world.map.fingerprint(), other.map.fingerprint());
+}
+
+TEST(ThreeLevelMap, WindowsThatSlideAwayAndBackForgetAndFillAgain) {
+  std::mt19937 generator(3);
+  World world;
+  for (int id = 0; id < 12; ++id) world.add(id, random_cloud(generator, 1'500, 12.0, 4.0), pose_at(4.0 * id, 0, 0));
+  const auto follow = [&](double x) { world.map.follow({x, 0.1, 0.2}, world.lookup()); };
+  follow(0.0);
+  const std::string at_home = world.map.fingerprint();
+  for (const double x : {3.0, 11.0, 25.0, 44.0, 140.0}) {
+    follow(x);
+    expect_equals_oracle(world);
+  }
+  EXPECT_EQ(world.map.sorted(1).size(), 0U) << "140 m away only the coarse level is left";
+  EXPECT_GT(world.map.sorted(2).size(), 0U);
+  follow(400.0);
+  EXPECT_EQ(world.map.size(), 0U);
+  follow(0.0);
+  EXPECT_EQ(world.map.fingerprint(), at_home);
+}
+
+TEST(ThreeLevelMap, WindowsFollowInSteps) {
+  World world;
+  world.map.follow({0.1, 0.0, 0.0}, world.lookup());
+  EXPECT_EQ(world.map.windows().centre, Eigen::Vector3d::Zero());
+  world.map.follow({0.37, 0.0, 0.0}, world.lookup());
+  EXPECT_EQ(world.map.windows().centre, Eigen::Vector3d::Zero()) << "0.37 of a step of 0.5 m";
+  world.map.follow({0.38, 0.0, 0.0}, world.lookup());
+  EXPECT_EQ(world.map.windows().centre, Eigen::Vector3d(0.5, 0.0, 0.0));
+  world.map.follow({0.2, 0.0, -0.3}, world.lookup());
+  EXPECT_EQ(world.map.windows().centre, Eigen::Vector3d(0.5, 0.0, 0.0)) << "no way back at the first centimetre";
 }
 
 TEST(ThreeLevelMap, UpsamplingKeepsThePointNearestTheCentreOfTheLargerCell) {
-  MapConfig config;
-  ThreeLevelMap map(config);
+  World world;
+  world.map.place_windows({0, 0, 0});
   // Two local cells of one mid cell [0, 0.25)^3, whose centre is 0.125.
-  const std::vector<CloudPoint> cloud = {{{0.02F, 0.02F, 0.02F}, 1.0F}, {{0.20F, 0.13F, 0.12F}, 2.0F}};
-  map.insert(cloud, pose_at(0, 0, 0));
-  ASSERT_EQ(map.level(0).size(), 2U);
-  map.insert({}, pose_at(12, 0, 0));
-  EXPECT_EQ(map.level(0).size(), 0U);
-  ASSERT_EQ(map.level(1).size(), 1U);
-  EXPECT_FLOAT_EQ(map.level(1).find({0, 0, 0})->intensity, 2.0F);
+  world.add(0, {{{0.02F, 0.02F, 0.02F}, 1.0F}, {{0.20F, 0.13F, 0.12F}, 2.0F}}, Pose{});
+  EXPECT_EQ(world.map.sorted(0).size(), 2U);
+  world.map.follow({20, 0, 0}, world.lookup());
+  EXPECT_EQ(world.map.sorted(0).size(), 0U);
+  ASSERT_EQ(world.map.sorted(1).size(), 1U);
+  EXPECT_FLOAT_EQ(world.map.find(1, {0, 0, 0})->intensity, 2.0F);
 }
 
-TEST(ThreeLevelMap, ForgetsWhatLeavesTheHeightWindow) {
-  ThreeLevelMap map(MapConfig{});
-  const std::vector<CloudPoint> cloud = {{{1.0F, -4.0F, 1.0F}, 1.0F}, {{1.0F, 4.0F, 1.0F}, 1.0F}};
-  map.insert(cloud, pose_at(0, 0, 0));
-  map.insert({}, pose_at(0, 2, 0));
-  EXPECT_EQ(map.size(), 1U);
-  EXPECT_TRUE(map.level(0).contains(map.level(0).cell_of({1.0, 4.0, 1.0})));
-}
-
-TEST(ThreeLevelMap, RefusesUnusablePosesAndPointsWithoutAnyChange) {
+TEST(ThreeLevelMap, MovedCloudsLeaveNothingBehind) {
   std::mt19937 generator(4);
-  ThreeLevelMap map(MapConfig{});
-  const std::vector<CloudPoint> cloud = random_cloud(generator, 500, 9.0, 4.0);
-  map.insert(cloud, pose_at(0, 0, 0));
-  const std::string before = map.fingerprint();
+  World world = random_world(5, 8, 2'000);
+  const std::vector<std::pair<std::int32_t, Pose>> moved = {{2, pose_at(3, 0.4, 1, 2.0)}, {5, pose_at(-9, 0, 7, -1.0)}};
+  world.map.move_clouds(moved, world.lookup());
+  expect_equals_oracle(world);
+  EXPECT_EQ(world.map.pose(2).translation, moved[0].second.translation);
+  // Far beyond all windows, and back.
+  const std::vector<std::pair<std::int32_t, Pose>> away = {{2, pose_at(2'000, 0, 0)}};
+  world.map.move_clouds(away, world.lookup());
+  expect_equals_oracle(world);
+  world.map.move_clouds(moved, world.lookup());
+  expect_equals_oracle(world);
+}
+
+TEST(ThreeLevelMap, ARemovedCloudMakesRoomForTheOthersPoints) {
+  World world = random_world(6, 6, 3'000);
+  const std::size_t before = world.map.size();
+  const std::vector<std::int32_t> ids = {1, 4};
+  world.map.remove_clouds(ids, world.lookup());
+  for (const std::int32_t id : ids) world.store.erase(id);
+  EXPECT_FALSE(world.map.contains(4));
+  EXPECT_LT(world.map.size(), before);
+  expect_equals_oracle(world);
+}
+
+TEST(ThreeLevelMap, SizesAreThoseOfTheTables) {
+  World world = random_world(7, 6, 3'000);
+  const auto expect_sizes = [&] {
+    std::array<std::size_t, kLevels> counted{};
+    world.map.for_each_tile([&](const Tile& tile) {
+      for (std::size_t i = 0; i < kLevels; ++i) counted[i] += tile.level(i).size();
+    });
+    for (std::size_t i = 0; i < kLevels; ++i) EXPECT_EQ(world.map.size(i), counted[i]);
+  };
+  expect_sizes();
+  world.map.follow({30, 0, 5}, world.lookup());
+  expect_sizes();
+  const std::vector<std::pair<std::int32_t, Pose>> moved = {{2, pose_at(33, 0.4, 1, 2.0)}};
+  world.map.move_clouds(moved, world.lookup());
+  expect_sizes();
+}
+
+TEST(ThreeLevelMap, RefusesPointsThatItCannotHold) {
+  World world;
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  Pose crooked = pose_at(0, 0, 0);
-  crooked.rotation.w() = 2.0;
-  for (const Pose& pose : {pose_at(1e7, 0, 0), pose_at(0, nan, 0), crooked}) {
-    EXPECT_EQ(map.insert(cloud, pose).rejected, cloud.size());
-  }
-  const std::vector<CloudPoint> bad = {{{nan, 0.0F, 0.0F}, 1.0F}, {{1e30F, 0.0F, 0.0F}, 1.0F}};
-  const InsertCounts counts = map.insert(bad, pose_at(0, 0, 0));
-  EXPECT_EQ(counts.rejected, 1U);
+  const InsertCounts counts = world.add(0,
+                                        {{{nan, 0.0F, 0.0F}, 1.0F},
+                                         {{1e30F, 0.0F, 0.0F}, 1.0F},
+                                         {{1.0F, 0.0F, 0.0F}, 1.0F},
+                                         {{500.0F, 0.0F, 0.0F}, 1.0F}},
+                                        Pose{});
+  EXPECT_EQ(counts.rejected, 2U);
   EXPECT_EQ(counts.outside, 1U);
-  EXPECT_EQ(map.fingerprint(), before);
-}
-
-TEST(ThreeLevelMap, ReplaceWorldEqualsAFreshBuildWhateverWasThereBefore) {
-  std::mt19937 generator(5);
-  std::vector<PlacedCloud> clouds;
-  for (int id = 0; id < 8; ++id) {
-    clouds.push_back({id, std::make_shared<const std::vector<CloudPoint>>(random_cloud(generator, 2'000, 14.0, 4.0)),
-                      pose_at(6 * id, 0, -2 * id, 0.3 * id)});
+  EXPECT_EQ(counts.inserted, 1U);
+  Pose crooked;
+  crooked.rotation.w() = 2.0;
+  for (const Pose& pose : {pose_at(1e7, 0, 0), pose_at(0, static_cast<double>(nan), 0), crooked}) {
+    EXPECT_FALSE(usable(pose));
   }
-  ThreeLevelMap used(MapConfig{});
-  for (int step = 0; step < 30; ++step) used.insert(random_cloud(generator, 300, 14.0, 4.0), pose_at(2 * step, 0, 3));
-  ThreeLevelMap fresh(MapConfig{});
-  const Pose here = pose_at(40, 0, -12, 1.0);
-  used.replace_world(clouds, here);
-  fresh.replace_world(clouds, here);
-  EXPECT_GT(fresh.level(0).size(), 0U);
-  EXPECT_GT(fresh.level(1).size(), 0U);
-  EXPECT_GT(fresh.level(2).size(), 0U);
-  EXPECT_EQ(used.fingerprint(), fresh.fingerprint());
-  clouds.back().T_world_body.translation.x() += 0.5;
-  fresh.replace_world(clouds, here);
-  EXPECT_NE(used.fingerprint(), fresh.fingerprint());
+  EXPECT_TRUE(usable(pose_at(-9'999, 3, 9'999, 1.0)));
 }
 
-TEST(ThreeLevelMap, StaysBelowItsCapByCoarseningTheFinestLevel) {
-  std::mt19937 generator(6);
+TEST(ThreeLevelMap, StaysWithinItsBoundByCoarsening) {
+  std::mt19937 generator(8);
   MapConfig config;
   config.max_voxels = 10'000;
-  ThreeLevelMap map(config);
-  for (int step = 0; step < 400; ++step) {
-    map.insert(random_cloud(generator, 500, 9.0, 4.0), pose_at(2.0 * step, 0, 0));
-    ASSERT_LE(map.size(), 10'000U);
+  World world(config);
+  for (int id = 0; id < 40; ++id) {
+    world.add(id, random_cloud(generator, 1'000, 9.0, 4.0), pose_at(4.0 * id, 0, 0));
+    world.map.follow({4.0 * id, 0, 0}, world.lookup());
+    world.map.stay_within_bound(world.lookup());
+    ASSERT_LE(world.map.size(), 10'000U);
   }
-  EXPECT_GT(map.coarsened(), 0);
-  EXPECT_GT(map.level(2).size(), 1'000U);
-}
-
-TEST(ThreeLevelMap, ViewShowsEveryPlaceOnceAndTheCoarserLevelsInsideTheRadiusOnly) {
-  std::mt19937 generator(7);
-  ThreeLevelMap map(MapConfig{});
-  for (int step = 0; step <= 40; ++step) map.insert(random_cloud(generator, 2'000, 9.0, 3.0), pose_at(step, 0, 0));
-  // Back again, so that fresh local voxels lie over older mid and coarse ones.
-  for (int step = 40; step >= 0; --step) map.insert(random_cloud(generator, 500, 9.0, 3.0), pose_at(step, 0, 0));
-  const double radius = 25.0;
-  const MapView view = map.view(radius);
-  EXPECT_EQ(view[0].voxels.size(), map.level(0).size());
-  const int ratios[] = {1, 2, 4};
-  std::array<std::set<CellIndex>, kLevels> shown;
-  for (std::size_t i = 0; i < kLevels; ++i) {
-    for (const ViewVoxel& voxel : view[i].voxels) {
-      EXPECT_TRUE(shown[i].insert(voxel.cell).second);
-      const Eigen::Vector3d p = map.level(i).find(voxel.cell)->p_world;
-      EXPECT_LE(horizontal(p, map.centre()), radius);
-      EXPECT_GE(p.y(), view[i].min_height);
-      EXPECT_LE(p.y(), view[i].max_height);
-    }
-  }
-  const auto covered = [&](std::size_t coarse, const CellIndex& cell) {
-    for (std::size_t fine = 0; fine < coarse; ++fine) {
-      for (const CellIndex& child : shown[fine]) {
-        if (parent_cell(child, ratios[coarse] / ratios[fine]) == cell) return true;
-      }
-    }
-    return false;
-  };
-  std::size_t hidden = 0;
-  map.level(1).for_each([&](const CellIndex& cell, const MapPoint& point) {
-    if (horizontal(point.p_world, map.centre()) > radius || hidden > 50) return;
-    EXPECT_NE(shown[1].contains(cell), covered(1, cell));
-    if (!shown[1].contains(cell)) ++hidden;
-  });
-  EXPECT_GT(hidden, 0U) << "no mid voxel was covered by a local one";
-  int checked = 0;
-  map.level(2).for_each([&](const CellIndex& cell, const MapPoint& point) {
-    if (horizontal(point.p_world, map.centre()) > radius || ++checked > 50) return;
-    EXPECT_NE(shown[2].contains(cell), covered(2, cell));
-  });
+  EXPECT_GT(world.map.coarsening(), 2) << "two levels left out were not enough";
+  EXPECT_GT(world.map.size(2), 1'000U);
+  EXPECT_EQ(world.map.fingerprint(), rebuild(world.job()).fingerprint());
 }
 
 TEST(ThreeLevelMap, ReportsTheMemoryOfItsTables) {
-  std::mt19937 generator(8);
-  ThreeLevelMap map(MapConfig{});
-  EXPECT_LT(map.bytes(), 1'000U);
-  map.insert(random_cloud(generator, 50'000, 9.0, 4.0), pose_at(0, 0, 0));
-  EXPECT_GE(map.bytes(), map.size() * 33);
-  EXPECT_LE(map.bytes(), map.size() * 33 * 3);
+  std::mt19937 generator(9);
+  World world;
+  EXPECT_LT(world.map.bytes(), 1'000U);
+  world.add(0, random_cloud(generator, 50'000, 9.0, 4.0), Pose{});
+  EXPECT_GE(world.map.bytes(), world.map.size() * 29);
+  EXPECT_LE(world.map.bytes(), world.map.size() * 57 + 1'000'000);
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// One connection's conversation: pairs announcements with binary messages, applies frames in order, checks each against
+// what the server announced, and asks for a snapshot when something does not fit. Knows no socket and no clock.
+
+import { decodeFrame, decodeLoopClouds, type Frame } from "./frame";
+import type { ClientText, FrameAnnouncement, LoopClouds, PerLevel, ServerText } from "./protocol";
+import { VoxelStore } from "./voxel_store";
+
+/** What is held after a frame, beside what the server announced for it. */
+export interface Applied {
+  sequence: number;
+  revision: number;
+  utime: number;
+  checksum: string;
+  counts: PerLevel;
+  announcedChecksum: string;
+  announcedCounts: PerLevel;
+}
+
+export interface SessionEvents {
+  send(message: ClientText): void;
+  text(message: ServerText): void;
+  applied(applied: Applied, frame: Frame): void;
+  clouds(announcement: LoopClouds, clouds: { from: Float32Array; to: Float32Array }): void;
+}
+
+export class StreamSession {
+  snapshots = 0;
+  deltas = 0;
+  resyncs = 0;
+  errors = 0;
+  private sequence: number | null = null; // null: only a snapshot helps
+  private fits = true; // the last snapshot had the announced checksum
+  private announced: FrameAnnouncement | LoopClouds | null = null;
+
+  constructor(private readonly store: VoxelStore, private readonly events: SessionEvents) {}
+
+  /** A new connection: the next frame must be a snapshot. */
+  begin(): void {
+    this.sequence = null;
+    this.announced = null;
+  }
+
+  takeText(text: string): void {
+    let message: ServerText;
+    try {
+      message = JSON.parse(text) as ServerText;
+    } catch {
+      this.errors++;
+      return;
+    }
+    if (message.type === "frame" || message.type === "loop_clouds") this.announced = message;
+    else this.events.text(message);
+  }
+
+  takeBinary(buffer: ArrayBuffer, tick: number): void {
+    const announced = this.announced;
+    this.announced = null;
+    try {
+      if (announced === null) throw new RangeError("a binary message came without announcement");
+      if (announced.type === "loop_clouds") this.events.clouds(announced, decodeLoopClouds(buffer));
+      else this.takeFrame(announced, buffer, tick);
+    } catch (error) {
+      if (!(error instanceof RangeError)) throw error;
+      this.errors++;
+      this.resync();
+    }
+  }
+
+  private takeFrame(announced: FrameAnnouncement, buffer: ArrayBuffer, tick: number): void {
+    const isSnapshot = announced.kind === "snapshot";
+    if (!isSnapshot && this.sequence === null) return; // a snapshot has been asked for and is on its way
+    if (!isSnapshot && announced.base !== this.sequence) {
+      this.resync();
+      return;
+    }
+    const frame = decodeFrame(buffer);
+    if (isSnapshot) {
+      this.store.applySnapshot(frame, tick);
+      this.snapshots++;
+    } else {
+      this.store.applyDelta(frame, tick);
+      this.deltas++;
+    }
+    this.sequence = announced.sequence;
+    const checksum = this.store.checksum();
+    this.events.applied(
+      {
+        sequence: announced.sequence,
+        revision: announced.revision,
+        utime: announced.utime,
+        checksum,
+        counts: [...this.store.counts],
+        announcedChecksum: announced.checksum,
+        announcedCounts: announced.counts,
+      },
+      frame,
+    );
+    if (isSnapshot) this.fits = checksum === announced.checksum;
+    // A snapshot that does not fit is counted and shown; asking for another one would only go in circles.
+    if (checksum !== announced.checksum) this.fits ? this.resync() : this.errors++;
+  }
+
+  private resync(): void {
+    this.sequence = null;
+    this.resyncs++;
+    this.events.send({ resync: true });
+  }
+}

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+import { beforeEach, describe, expect, it } from "vitest";
+import { pauseBefore } from "../src/stream/connection";
+import type { ClientText, ServerText } from "../src/stream/protocol";
+import { StreamSession, type Applied } from "../src/stream/session";
+import { VoxelStore } from "../src/stream/voxel_store";
+import { checksumOf, encode, type TestVoxel } from "./frames";
+
+const voxel = (x: number): TestVoxel => ({ level: 0, cell: [x, 0, 0], intensity: 9, flags: 0 });
+let sent: ClientText[], texts: ServerText[], applied: Applied[], session: StreamSession;
+
+beforeEach(() => {
+  [sent, texts, applied] = [[], [], []];
+  session = new StreamSession(new VoxelStore(), {
+    send: (message) => sent.push(message),
+    text: (message) => texts.push(message),
+    applied: (result) => applied.push(result),
+    clouds: () => {},
+  });
+  session.begin();
+});
+
+function offer(kind: "snapshot" | "delta", sequence: number, held: TestVoxel[], records = held, checksum = checksumOf(held)): void {
+  const base = kind === "delta" ? { base: sequence - 1 } : {};
+  session.takeText(JSON.stringify({ type: "frame", kind, sequence, ...base, revision: sequence, counts: [held.length, 0, 0], checksum, utime: 0 }));
+  session.takeBinary(encode({ voxels: records }), 0);
+}
+
+describe("StreamSession", () => {
+  it("applies a snapshot and the deltas that follow it", () => {
+    offer("snapshot", 1, [voxel(1)]);
+    offer("delta", 2, [voxel(1), voxel(2)], [voxel(2)]);
+    expect(applied.map(({ sequence, counts, checksum, announcedChecksum }) => [sequence, counts[0], checksum === announcedChecksum]))
+      .toEqual([[1, 1, true], [2, 2, true]]);
+    expect(sent).toEqual([]);
+  });
+
+  it("asks for a snapshot when a delta is missing, ignores deltas until it comes, and goes on from there", () => {
+    offer("snapshot", 1, [voxel(1)]);
+    offer("delta", 3, [voxel(1), voxel(3)], [voxel(3)]);
+    offer("delta", 4, [voxel(1), voxel(4)], [voxel(4)]);
+    expect(sent).toEqual([{ resync: true }]);
+    expect(applied.length).toBe(1);
+    offer("snapshot", 5, [voxel(5)]);
+    offer("delta", 6, [voxel(5), voxel(6)], [voxel(6)]);
+    expect(applied.map(({ sequence }) => sequence)).toEqual([1, 5, 6]);
+    expect([session.snapshots, session.deltas, session.resyncs]).toEqual([2, 1, 1]);
+  });
+
+  it("asks for a snapshot when the checksum is another one", () => {
+    offer("snapshot", 1, [voxel(1)]);
+    offer("delta", 2, [voxel(1), voxel(2)], [voxel(3)]);
+    expect(sent).toEqual([{ resync: true }]);
+  });
+
+  it("counts a snapshot that does not fit, without asking in circles", () => {
+    offer("snapshot", 1, [voxel(1)], [voxel(2)]);
+    offer("delta", 2, [voxel(1), voxel(3)], [voxel(3)]);
+    expect([sent.length, session.errors]).toEqual([0, 2]);
+  });
+
+  it("begins anew after a reconnection", () => {
+    offer("snapshot", 1, [voxel(1)]);
+    session.begin();
+    offer("delta", 2, [voxel(1), voxel(2)], [voxel(2)]);
+    expect(applied.length).toBe(1);
+    offer("snapshot", 1, [voxel(2)]);
+    expect(applied.at(-1)!.counts).toEqual([1, 0, 0]);
+  });
+
+  it("survives broken messages and asks for a snapshot", () => {
+    session.takeText("{");
+    session.takeBinary(new ArrayBuffer(10), 0);
+    session.takeText(JSON.stringify({ type: "frame", kind: "snapshot", sequence: 1, revision: 0, counts: [0, 0, 0], checksum: "", utime: 0 }));
+    session.takeBinary(new ArrayBuffer(80), 0);
+    expect(session.errors).toBe(3);
+    expect(sent).toEqual([{ resync: true }, { resync: true }]);
+  });
+
+  it("hands on texts of every other kind", () => {
+    session.takeText('{"type": "view", "radius": 25}');
+    session.takeText('{"type": "later_invention"}');
+    expect(texts.map(({ type }) => type as string)).toEqual(["view", "later_invention"]);
+  });
+});
+
+describe("pauseBefore", () => {
+  it("doubles up to a limit", () => {
+    expect([1, 2, 3, 4, 5, 6, 60].map(pauseBefore)).toEqual([500, 1000, 2000, 4000, 8000, 8000, 8000]);
+  });
+});

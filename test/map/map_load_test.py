@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the stream costs, and what slow viewers cost the others: a drive in a 200 m by 200 m map over the real bus.
+
+The same as a measurement: python test/map/map_load_test.py SECONDS (in the environment of the tests).
+"""
+
+import json
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from map_drive import SCAN_PERIOD, URL, Drive
+from stream_client import ViewState
+
+SIDE = 200.0
+NAIVE_BYTES = 38e6  # what a complete frame of such a map takes by the reference
+VIEW = 25.0
+SPEED = 2.0
+
+
+def hall_points(generator, position, count, reach=15.0):
+    """Points on the floor and on rack faces every 6 m along Z, within reach of the position; body axes, no rotation."""
+    offset = generator.uniform(-reach, reach, (count, 2))
+    x, z = position[0] + offset[:, 0], position[2] + offset[:, 1]
+    y = np.full(count, -0.5)
+    on_rack = generator.random(count) < 0.67
+    x = np.where(on_rack, 6.0 * np.round(x / 6.0) + np.where(generator.random(count) < 0.5, 0.6, -0.6), x)
+    y = np.where(on_rack, generator.uniform(-0.5, 3.0, count), y)
+    points = np.stack([x, y, z], axis=1) - position
+    return points[np.linalg.norm(points, axis=1) < reach]
+
+
+class HallDrive(Drive):
+    """A hall of 200 m by 200 m that is known already, and a drive through it."""
+
+    def fill(self):
+        """Keyframes every 10 m; scans between them only tell where the vehicle is."""
+        for lane in range(20):
+            for stop in range(20):
+                along = stop if lane % 2 == 0 else 19 - stop
+                position = np.array([10.0 * lane - 95.0, 0.0, -10.0 * along + 95.0])
+                self.publish_cloud(position, np.zeros((0, 3)))
+                self.publish_keyframe(position, hall_points(self.generator, position, 4000))
+                self.step += 1
+                time.sleep(0.004)
+        self.began = self.step
+
+    def position(self):
+        return np.array([-93.0, 0.0, 60.0 - SPEED * SCAN_PERIOD * (self.step - self.began)])
+
+    def advance(self):
+        position = self.position()
+        self.sent_at[self.stamp()] = time.monotonic()
+        self.publish_cloud(position, hall_points(self.generator, position, 1000))
+        self.publish_state(position)
+        self.publish_stats()
+        if self.step % round(4.0 / (SPEED * SCAN_PERIOD)) == 0:
+            self.publish_keyframe(position, hall_points(self.generator, position, 1500))
+        self.step += 1
+
+    def drive(self, seconds):
+        """In real time."""
+        began = time.monotonic()
+        for i in range(round(seconds / SCAN_PERIOD)):
+            time.sleep(max(0.0, began + i * SCAN_PERIOD - time.monotonic()))
+            self.advance()
+
+    sent_at: dict[int, float]
+
+    def __init__(self):
+        super().__init__()
+        self.sent_at = {}
+
+
+class FastViewer(threading.Thread):
+    """Reads as fast as it comes and notes when and how much: checking every voxel is the business of other tests."""
+
+    def __init__(self, server):
+        super().__init__(daemon=True)
+        _, self.socket = server.upgrade()
+        self.frames, self.hud = [], None  # kind, bytes, when
+        self.start()
+
+    def run(self):
+        announced = None
+        try:
+            while True:
+                opcode, payload = self.socket.receive()
+                if opcode == 1:
+                    announced = json.loads(payload)
+                    self.hud = announced if announced["type"] == "hud" else self.hud
+                elif opcode == 2:
+                    self.frames.append((announced["kind"], len(payload), time.monotonic()))
+        except OSError:
+            pass
+
+
+class SlowViewer(threading.Thread):
+    """Reads `rate` bytes a second, as through a thin line: small buffers, so that nothing hides in them."""
+
+    def __init__(self, server, sent_at, rate=1000):
+        super().__init__(daemon=True)
+        self.server, self.sent_at, self.rate = server, sent_at, rate
+        self.state, self.frames, self.ended, self.failure = ViewState(), [], False, None
+        self.start()
+
+    def run(self):
+        connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        connection.settimeout(30)
+        connection.connect(("127.0.0.1", self.server.port))
+        _, peer = self.server.upgrade(connection=connection)
+        peer.exactly = lambda count: self.thin_read(peer.connection, count)
+        announced, began = None, 0.0
+        try:
+            while not self.ended:
+                self.message_began = None
+                opcode, payload = peer.receive()
+                if opcode == 1:
+                    announced, began = json.loads(payload), self.message_began
+                elif opcode == 2:
+                    self.state.apply(announced, payload)
+                    now = time.monotonic()
+                    self.frames.append((announced["utime"], len(payload), now - began, now))
+        except Exception as error:
+            self.failure = error
+
+    def thin_read(self, connection, count):
+        data = b""
+        while len(data) < count:
+            part = connection.recv(min(count - len(data), self.rate // 10))
+            if not part:
+                raise ConnectionError("closed")
+            if self.message_began is None:
+                self.message_began = time.monotonic()
+            data += part
+            time.sleep(len(part) / self.rate)
+        return data
+
+
+def rss_kb(pid):
+    with open(f"/proc/{pid}/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
+
+
+def measure_bandwidth(server, seconds):
+    viewer, drive = FastViewer(server), HallDrive()
+    drive.fill()
+    drive.drive(3)  # the first seconds show the hall itself
+    first, began = len(viewer.frames), time.monotonic()
+    drive.drive(seconds)
+    spent = time.monotonic() - began
+    frames = viewer.frames[first:]
+    viewer.socket.send(b'{"resync": true}')
+    deadline = time.monotonic() + 10
+    while viewer.frames[-1][0] != "snapshot":
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return {
+        "frames_per_s": len(frames) / spent,
+        "kB_per_s": sum(size for _, size, _ in frames) / spent / 1e3,
+        "largest_delta_kB": max(size for _, size, _ in frames) / 1e3,
+        "snapshot_kB": viewer.frames[-1][1] / 1e3,
+        "map_voxels": viewer.hud["map"]["voxels"],
+        "snapshots": sum(kind == "snapshot" for kind, _, _ in frames),
+        "map_bytes_MB": viewer.hud["map"]["bytes"] / 1e6,
+    }
+
+
+def measure_slow_viewer(server, seconds):
+    drive = HallDrive()
+    drive.fill()
+    fast = [FastViewer(server), FastViewer(server)]
+    drive.drive(4)
+
+    def rate_over(duration):
+        first, began = [len(viewer.frames) for viewer in fast], time.monotonic()
+        drive.drive(duration)
+        spent = time.monotonic() - began
+        return [(len(viewer.frames) - count) / spent for viewer, count in zip(fast, first, strict=True)]
+
+    alone = rate_over(10)
+    slow = SlowViewer(server, drive.sent_at)
+    drive.drive(5)
+    memory = [rss_kb(server.process.pid)]
+    beside = rate_over(seconds)
+    memory.append(rss_kb(server.process.pid))
+    slow.ended = True
+    ages = [now - drive.sent_at[utime] - transfer for utime, _, transfer, now in slow.frames if utime in drive.sent_at]
+    return {
+        "fast_alone_hz": alone,
+        "fast_beside_hz": beside,
+        "rss_kB": memory,
+        "slow_frames": len(slow.frames),
+        "slow_frame_kB": [round(size / 1e3, 1) for _, size, _, _ in slow.frames],
+        "slow_age_beyond_transfer_s": [round(age, 2) for age in ages],
+        "slow_failure": repr(slow.failure),
+    }
+
+
+@pytest.fixture
+def running(private_network, start_server):
+    server = start_server("--port", "0", url=URL)
+    yield server
+    assert server.stop() == 0
+
+
+def test_deltas_stay_below_the_bandwidth_and_a_snapshot_far_below_a_whole_map(running):
+    figures = measure_bandwidth(running, 10)
+    print(json.dumps(figures))
+    assert figures["kB_per_s"] < 250
+    assert figures["snapshots"] == 0, "while driving, deltas are enough"
+    assert figures["frames_per_s"] > 8
+    assert figures["snapshot_kB"] * 1e3 < NAIVE_BYTES / 20
+    assert sum(figures["map_voxels"]) > 300_000, "the hall is there"
+
+
+def test_a_viewer_that_reads_a_kilobyte_a_second_costs_the_others_nothing(running):
+    figures = measure_slow_viewer(running, 45)
+    print(json.dumps(figures))
+    assert figures["slow_failure"] == "None"
+    for alone, beside in zip(figures["fast_alone_hz"], figures["fast_beside_hz"], strict=True):
+        assert beside > 0.9 * alone
+    assert figures["slow_frames"] >= 1
+    assert max(figures["slow_age_beyond_transfer_s"]) < 2.0
+
+
+if __name__ == "__main__":
+    import sys
+
+    from ignis.pipeline import enter_private_network
+    from stream_server import Server
+
+    enter_private_network()
+    for measure in (measure_bandwidth, measure_slow_viewer):
+        process = Server("--port", "0", url=URL)
+        print(json.dumps(measure(process, float(sys.argv[1])), indent=1))
+        process.stop()
