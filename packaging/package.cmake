@@ -57,8 +57,7 @@ set(CPACK_COMPONENTS_ALL vehicle)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_VEHICLE_PACKAGE_NAME ignis-lio)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-# LCM's Python module in its wheel is for one Python: Debian 13's.
+# Libraries are added by packaging/build_package. LCM's Python module in its wheel is for one Python: Debian 13's.
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "python3 (>= 3.13), python3 (<< 3.14), python3-numpy, iproute2, passwd")
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "default-jre | java-runtime, s6")
 set(CPACK_DEBIAN_PACKAGE_SECTION science)

@@ -21,7 +21,8 @@ void tell(std::string& text, int periods, const std::string& what) {
 }  // namespace
 
 void BudgetWatch::add_latency(double latency_ms) {
-  if (latency_ms >= 0.0 && latency_ms <= kLongestCredibleMs) worst_latency_ms_ = std::max(worst_latency_ms_, latency_ms);
+  if (latency_ms >= 0.0 && latency_ms <= kLongestCredibleMs)
+    worst_latency_ms_ = std::max(worst_latency_ms_, latency_ms);
 }
 
 void BudgetWatch::sample(double now_s, const ProcessUsage& usage) {

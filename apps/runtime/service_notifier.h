@@ -15,8 +15,8 @@ class ServiceNotifier {
   ServiceNotifier();
 
   /// Call at every turn of the main loop. `progress`: what has been handled since start; `now_s` [s of any steady
-  /// clock]. The first call says READY. The watchdog is fed only when `progress` has grown since it was fed last: a loop
-  /// that hangs in a handler starves it, and so does one that turns without handling anything.
+  /// clock]. The first call says READY. The watchdog is fed only when `progress` has grown since it was fed last: a
+  /// loop that hangs in a handler starves it, and so does one that turns without handling anything.
   void turn(std::int64_t progress, double now_s);
 
   /// One line for `systemctl status`.

@@ -39,10 +39,10 @@ def open_bus(url: str) -> lcm.LCM:
         ) from None
 
 
-def message_types() -> dict[bytes, type]:
+def message_types() -> dict[bytes, Any]:
     """Our message types by their fingerprint."""
-    found = (getattr(types, name) for name in dir(types) if name.endswith("_t"))
-    return {kind._get_packed_fingerprint(): kind for kind in found if isinstance(kind, type)}
+    found: list[Any] = [getattr(types, name) for name in dir(types) if name.endswith("_t")]
+    return {kind._get_packed_fingerprint(): kind for kind in found}
 
 
 @dataclass

@@ -34,9 +34,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="ignis doctor", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--config", type=Path, default=default_config(), help="configuration file (default: %(default)s)")
+    parser.add_argument(
+        "--config", type=Path, default=default_config(), help="configuration file (default: %(default)s)"
+    )
     parser.add_argument("--port", help="serial port instead of driver.port")
-    parser.add_argument("--seconds", type=float, default=4.0, help="how long to listen on the bus (default: %(default)s)")
+    parser.add_argument(
+        "--seconds", type=float, default=4.0, help="how long to listen on the bus (default: %(default)s)"
+    )
     parser.add_argument("--folder", type=Path, default=Path.cwd(), help="where recordings go (default: here)")
     parser.add_argument("--json", action="store_true", help="findings as one JSON object")
     options = parser.parse_args(arguments)

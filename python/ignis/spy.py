@@ -32,7 +32,9 @@ def _spy(options: argparse.Namespace) -> int:
     if not jar.is_file():
         raise InputError(f"{jar} is missing; run ./ignis build")
     if shutil.which("java") is None:
-        raise InputError("lcm-spy needs Java (sudo apt-get install default-jre); ./ignis echo and ./ignis hz do without")
+        raise InputError(
+            "lcm-spy needs Java (sudo apt-get install default-jre); ./ignis echo and ./ignis hz do without"
+        )
     if not os.environ.get("DISPLAY"):
         raise InputError("there is no display; ./ignis echo CHANNEL and ./ignis hz work in a terminal")
     classpath = os.pathsep.join(part for part in (str(jar), os.environ.get("CLASSPATH", "")) if part)

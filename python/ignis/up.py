@@ -26,7 +26,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--config", type=Path, default=default_config(), help="configuration (default: %(default)s)")
     parser.add_argument("--port", help="serial port instead of driver.port")
-    parser.add_argument("--state", type=Path, default=default_state_folder(), help="folder for s6, logs and the journal")
+    parser.add_argument(
+        "--state", type=Path, default=default_state_folder(), help="folder for s6, logs and the journal"
+    )
     parser.add_argument("--view-port", type=int, help="TCP port of the view instead of hmi.port")
     parser.add_argument(
         "--only", nargs="+", metavar="PROCESS", help="start these alone, for a vehicle with several computers"
@@ -50,7 +52,9 @@ def _up(options: argparse.Namespace) -> int:
         raise InputError(f"already up ({supervisor.name}); ./ignis status shows how it is, ./ignis down ends it")
     late = supervisor.start(options.seconds)
     if late:
-        print(f"ignis: not ready after {options.seconds:g} s: {', '.join(late)}; {supervisor.logs_hint}", file=sys.stderr)
+        print(
+            f"ignis: not ready after {options.seconds:g} s: {', '.join(late)}; {supervisor.logs_hint}", file=sys.stderr
+        )
         return 1
     print(f"up under {supervisor.name}; {supervisor.logs_hint}")
     return 0

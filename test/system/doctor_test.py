@@ -27,7 +27,9 @@ CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
 URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 LISTEN_SECONDS = 2.0
-ALL_FOUR = tuple(health(name, pid) for pid, name in enumerate(("l1_driver", "lio_frontend", "graph_backend", "map_builder")))
+ALL_FOUR = tuple(
+    health(name, pid) for pid, name in enumerate(("l1_driver", "lio_frontend", "graph_backend", "map_builder"))
+)
 
 
 def worst(findings: Iterable[Finding]) -> Finding:

@@ -90,7 +90,13 @@ def check_data(heard: Heard) -> Iterator[Finding]:
     yield from check_rates(heard)
     yield from check_inertial(heard.gyro, heard.accel)
     if heard.counts.get("L1_SCAN") and heard.scan_points == 0:
-        yield Finding("data", "points", Severity.ERROR, "scans hold no points: cover on, or range limits wrong", "./ignis echo L1_STATUS")
+        yield Finding(
+            "data",
+            "points",
+            Severity.ERROR,
+            "scans hold no points: cover on, or range limits wrong",
+            "./ignis echo L1_STATUS",
+        )
     if abs(heard.age_s) > _AGE_WARNING_S:
         text = f"stamps of measurements are {heard.age_s:+.1f} s from this computer's clock"
         yield Finding("data", "stamps", Severity.WARNING, text, "sudo timedatectl set-ntp true   # on each computer")
@@ -141,13 +147,17 @@ def check_inertial(gyro: np.ndarray, accel: np.ndarray) -> Iterator[Finding]:
         yield Finding("data", "inertial unit", Severity.ERROR, "values that are no numbers", "./ignis echo L1_IMU")
         return
     if np.all(accel == accel[0]) and np.all(gyro == gyro[0]):
-        yield Finding("data", "inertial unit", Severity.ERROR, "values are frozen", "./ignis l1 standby && ./ignis l1 normal")
+        yield Finding(
+            "data", "inertial unit", Severity.ERROR, "values are frozen", "./ignis l1 standby && ./ignis l1 normal"
+        )
         return
     mean, turning = accel.mean(axis=0), float(np.median(np.linalg.norm(gyro, axis=1)))
     size = float(np.linalg.norm(mean))
     if 0.8 < size < 1.2:
         text = f"gravity measures {size:.2f}: the unit is g, must be m/s^2"
-        yield Finding("data", "gravity", Severity.ERROR, text, f"{_MOUNT_CHECK}   # the importer or driver must convert")
+        yield Finding(
+            "data", "gravity", Severity.ERROR, text, f"{_MOUNT_CHECK}   # the importer or driver must convert"
+        )
         return
     if turning > _REST_GYRO:
         hint = "degrees instead of radians?" if turning > 5.0 else "stand still and try again"

@@ -65,7 +65,9 @@ def check_disk(folder: Path, free: float) -> Finding:
     if free >= DISK_WARNING:
         return Finding("host", "disk", Severity.OK, text)
     severity = Severity.ERROR if free < DISK_ERROR else Severity.WARNING
-    return Finding("host", "disk", severity, f"{text}, about {free / 2.5e9:.1f} hours of recording", f"du -sh {folder}/*")
+    return Finding(
+        "host", "disk", severity, f"{text}, about {free / 2.5e9:.1f} hours of recording", f"du -sh {folder}/*"
+    )
 
 
 def check_governor(root: Path) -> Finding:

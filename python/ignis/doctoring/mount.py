@@ -35,7 +35,9 @@ def check_mount(extrinsics: dict[str, Any], *, is_l1: bool = True) -> Iterator[F
     for text in troubles:
         yield Finding("mount", "extrinsics", Severity.ERROR, text, fix)
     if not troubles:
-        text = f"lidar pitch {lidar.pitch_deg:.1f}, roll {lidar.roll_deg:.1f} degrees; imu {1000 * apart:.0f} mm beside it"
+        text = (
+            f"lidar pitch {lidar.pitch_deg:.1f}, roll {lidar.roll_deg:.1f} degrees; imu {1000 * apart:.0f} mm beside it"
+        )
         yield Finding("mount", "extrinsics", Severity.OK, text)
 
 
