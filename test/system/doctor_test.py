@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+from vehicle_peers import Talker, health
 
 from ignis.doctoring.data import check_data, check_inertial, hear
 from ignis.doctoring.finding import EXIT_WARNINGS, Finding, Severity, exit_code
@@ -21,7 +22,6 @@ from ignis.doctoring.network import check_port as check_view_port
 from ignis.doctoring.network import check_url
 from ignis.doctoring.sensor import check_sensor
 from ignis.doctoring.software import check_jar, check_versions
-from vehicle_peers import Talker, health
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./ignis spy` on a display of its own: lcm-spy finds our types and shows the bus. The picture is kept for the docs."""
+"""`./ignis spy` on a display of its own: lcm-spy finds our types and shows the bus. The picture is for the docs."""
 
 import os
 import shutil
@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 import pytest
-
 from vehicle_peers import Talker, health
 
 URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"

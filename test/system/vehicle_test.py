@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./ignis up` without systemd during a simulated drive: each process killed in turn is restarted, the drive goes on."""
+"""`./ignis up` without systemd in a simulated drive: each process killed in turn is restarted, the drive goes on."""
 
 import json
 import os
@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from vehicle_peers import health
 
 from ignis.bus import Listener
 from ignis.pipeline import Pipeline, effective_config
 from ignis.status import all_well, disagreements, page
-from vehicle_peers import health
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The computer: receive buffers, clock, disk, CPU governor. Reads /proc and /sys below a root, so tests can give one."""
+"""Computer: receive buffers, clock, disk, CPU governor. Reads /proc and /sys below a root, so tests can give it."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def check_route(url: str) -> Iterator[Finding]:
             "route",
             Severity.ERROR,
             f"TTL {ttl} is meant for several computers, but multicast goes through lo: others hear nothing",
-            "sudo ip route del 224.0.0.0/4 dev lo; sudo ip route add 224.0.0.0/4 dev eth0   # the interface to the others",
+            "sudo ip route del 224.0.0.0/4 dev lo; sudo ip route add 224.0.0.0/4 dev eth0   # the others' link",
         )
     else:
         yield Finding("bus", "route", Severity.OK, f"multicast goes through {device}")
