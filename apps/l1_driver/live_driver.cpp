@@ -49,9 +49,11 @@ void LiveDriver::step() {
 
 void LiveDriver::exchange() {
   const std::size_t count = link_->read(buffer_, kReadTimeoutMs);
+  const Utime arrived = steady_now();
   const auto bytes = std::span<const std::byte>(buffer_).first(count);
   if (recording_) recording_->append(bytes);
   for (const l1::Event& event : decoder_.feed(bytes, host_clock_.now())) publisher_.publish(event);
+  bus_.add_latency(1e-3 * static_cast<double>(steady_now() - arrived));
   if (const auto answer = decoder_.take_outgoing(); !answer.empty()) link_->write(answer);
   ask_for_version();
 }
@@ -70,6 +72,8 @@ void LiveDriver::ask_for_version() {
 }
 
 void LiveDriver::report() {
+  while (bus_.handle(0)) {
+  }
   const Utime now = steady_now();
   if (recording_ && now - last_flush_ >= kMicrosPerSecond) {
     last_flush_ = now;

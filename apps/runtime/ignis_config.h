@@ -12,6 +12,7 @@
 #include "drivers/driver_config.h"
 #include "frontend/frontend_config.h"
 #include "map/map_config.h"
+#include "runtime/health_config.h"
 #include "runtime/hmi_config.h"
 #include "runtime/lcm_config.h"
 
@@ -40,6 +41,7 @@ struct IgnisConfig {
   MapConfig map;
   HmiConfig hmi;
   LcmConfig lcm;
+  HealthConfig health;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.section("driver", self.driver, "L1 driver");
@@ -49,6 +51,7 @@ struct IgnisConfig {
     visit.section("map", self.map, "three-level voxel map");
     visit.section("hmi", self.hmi, "browser view");
     visit.section("lcm", self.lcm, "message bus");
+    visit.section("health", self.health, "what each process may use before it calls itself DEGRADED");
   }
   /// Filter and graph describe one inertial unit: gravity and noise densities must agree. Bias walks may differ, since
   /// the filter's also stands for what its linearisation leaves out.

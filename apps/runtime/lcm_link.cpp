@@ -1,15 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/lcm_link.h"
 
+#include <algorithm>
 #include <format>
+#include <utility>
 
 #include <unistd.h>
+
+#include "runtime/channels.h"
+#include "runtime/process_usage.h"
 
 namespace ignis::runtime {
 namespace {
 
 constexpr std::chrono::seconds kHealthPeriod{1};
 constexpr std::chrono::milliseconds kTextPeriod{200};
+constexpr double kSamplePeriod_s = 1.0;
+constexpr int kHealthQueue = 100;
+
+Utime system_utime() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
 
 std::string cannot_open(const std::string& url) {
   std::string text = std::format("cannot open the message bus {}.", url);
@@ -23,7 +35,13 @@ std::string cannot_open(const std::string& url) {
 }  // namespace
 
 LcmLink::LcmLink(const Application& application)
-    : process_(application.name), config_hash_(application.config_hash), lcm_(application.config.lcm.url) {
+    : identity_{.process = application.name,
+                .pid = getpid(),
+                .version = version(),
+                .config_hash = application.config_hash},
+      lcm_(application.config.lcm.url),
+      budget_(application.config.health.limits_of(application.name)),
+      peers_(identity_) {
   if (!lcm_.good()) throw UserError(cannot_open(application.config.lcm.url), kFailed);
 }
 
@@ -31,6 +49,7 @@ void LcmLink::subscribe_raw(Receiver& receiver, int queue_capacity) {
   lcm::Subscription* subscription = lcm_.subscribeFunction(receiver.counts.channel, &LcmLink::on_message, &receiver);
   if (subscription == nullptr) throw UserError(std::format("cannot subscribe to {}", receiver.counts.channel), kFailed);
   subscription->setQueueCapacity(queue_capacity);
+  receiver.budget = &budget_;
 }
 
 void LcmLink::on_message(const lcm::ReceiveBuffer* buffer, const std::string&, Receiver* receiver) {
@@ -40,29 +59,90 @@ void LcmLink::on_message(const lcm::ReceiveBuffer* buffer, const std::string&, R
     return;
   }
   receiver->deliver({static_cast<const std::byte*>(buffer->data), buffer->data_size});
+  // LCM's receiving thread stamps with the system's clock, so this compares with it.
+  receiver->budget->add_latency(1e-3 * static_cast<double>(system_utime() - buffer->recv_utime));
 }
 
-bool LcmLink::handle(int timeout_ms) { return lcm_.handleTimeout(timeout_ms) > 0; }
+bool LcmLink::handle(int timeout_ms) {
+  const int handled = lcm_.handleTimeout(timeout_ms);
+  if (handled >= 0) ++progress_;
+  return handled > 0;
+}
+
+double LcmLink::uptime_s() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+}
+
+/// Not in the constructor: a process that only publishes and never reports has no use for it.
+void LcmLink::watch_peers() {
+  if (std::exchange(watching_peers_, true)) return;
+  subscribe<health_t>(
+      channels::kHealth, kHealthQueue,
+      [this](const health_t& message) {
+        peers_.observe({.process = message.process,
+                        .pid = message.pid,
+                        .version = message.version,
+                        .config_hash = message.config_hash},
+                       uptime_s());
+      },
+      Senders::kSeveral);
+}
+
+void LcmLink::sample_budget() {
+  const double now = uptime_s();
+  if (last_sample_s_ >= 0.0 && now - last_sample_s_ < kSamplePeriod_s) return;
+  last_sample_s_ = now;
+  budget_.sample(now, process_usage());
+}
+
+std::string LcmLink::own_trouble() const {
+  std::string text = peers_.trouble(uptime_s());
+  const std::string budget = budget_.trouble();
+  if (!text.empty() && !budget.empty()) text += "; ";
+  return text + budget;
+}
 
 void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets) {
-  const auto now = std::chrono::steady_clock::now();
-  // A text may hold figures that change all the time.
-  const bool due = now - last_health_ >= (state_text == last_state_text_ ? kHealthPeriod : kTextPeriod);
-  if (!due && state == last_state_) return;
-  last_health_ = now;
-  last_state_ = state;
-  last_state_text_ = state_text;
+  watch_peers();
+  sample_budget();
+  supervisor_.turn(progress_, uptime_s());
+
   health_t message;
-  message.utime = utime;
-  message.sequence = health_sequence_++;
-  message.process = process_;
-  message.pid = getpid();
   message.state = state;
   message.state_text = state_text;
+  if (const std::string trouble = own_trouble(); !trouble.empty()) {
+    message.state = std::max(state, health_t::DEGRADED);
+    message.state_text = state == health_t::OK ? trouble : std::format("{}; {}", state_text, trouble);
+  }
+  const auto now = std::chrono::steady_clock::now();
+  // A text may hold figures that change all the time.
+  const bool due = now - last_health_ >= (message.state_text == last_state_text_ ? kHealthPeriod : kTextPeriod);
+  if (!due && message.state == last_state_) return;
+  if (message.state_text != last_state_text_) supervisor_.status(message.state_text);
+  last_health_ = now;
+  last_state_ = message.state;
+  last_state_text_ = message.state_text;
+  message.utime = utime;
+  message.sequence = health_sequence_++;
   message.resets = resets;
-  message.version = version();
-  message.config_hash = config_hash_;
-  message.uptime_s = std::chrono::duration<double>(now - started_).count();
+  publish_health(message);
+}
+
+void LcmLink::publish_health(health_t& message) {
+  message.process = identity_.process;
+  message.pid = identity_.pid;
+  message.version = identity_.version;
+  message.config_hash = identity_.config_hash;
+  message.uptime_s = uptime_s();
+  message.progress = progress_;
+  message.failed_sends = failed_sends_;
+  message.cpu_percent = budget_.cpu_percent();
+  message.memory_mb = budget_.memory_mb();
+  message.latency_ms = budget_.latency_ms();
+  const ProcessLimits limits = budget_.limits().value_or(ProcessLimits{});
+  message.cpu_limit_percent = limits.cpu_percent;
+  message.memory_limit_mb = limits.memory_mb;
+  message.latency_limit_ms = limits.latency_ms;
   message.num_receivers = static_cast<std::int32_t>(receivers_.size());
   for (const Receiver& receiver : receivers_) {
     message.channels.push_back(receiver.counts.channel);
@@ -71,7 +151,7 @@ void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& s
     message.rejected.push_back(receiver.counts.rejected);
     message.queue_drops.push_back(receiver.counts.queue_drops);
   }
-  publish("HEALTH", message);
+  publish(channels::kHealth, message);
 }
 
 }  // namespace ignis::runtime

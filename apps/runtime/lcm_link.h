@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <functional>
@@ -11,7 +12,10 @@
 
 #include "messages/length_check.h"
 #include "runtime/application.h"
+#include "runtime/budget_watch.h"
+#include "runtime/peer_watch.h"
 #include "runtime/sequence_tracker.h"
+#include "runtime/service_notifier.h"
 
 namespace ignis::runtime {
 
@@ -60,11 +64,18 @@ class LcmLink {
     return receiver.counts;
   }
 
-  /// Waits at most `timeout_ms` for one message and handles it. True when one was handled.
+  /// Waits at most `timeout_ms` for one message and handles it. True when one was handled. Returning from it without an
+  /// error is progress: everything that had arrived so far has been handled.
   bool handle(int timeout_ms);
 
+  /// For work that does not come over the bus, such as bytes of a serial line: it was done `latency_ms` after its input
+  /// had arrived.
+  void add_latency(double latency_ms) { budget_.add_latency(latency_ms); }
+
   /// Publishes HEALTH when a second has passed, at once when `state` changed, and for a new text every 200 ms.
-  /// `utime`: newest measurement seen [us]. `state`: one of health_t's constants.
+  /// `utime`: newest measurement seen [us]. `state`: one of health_t's constants; OK becomes DEGRADED, with the reason,
+  /// when this process exceeds its limits or disagrees with others on the bus about configuration or version. Call it
+  /// at every turn of the main loop: the supervisor hears of readiness and progress here.
   void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
 
   [[nodiscard]] std::int64_t failed_sends() const { return failed_sends_; }
@@ -74,21 +85,32 @@ class LcmLink {
     ReceiverCounts counts;
     SequenceTracker sequence;
     std::function<void(std::span<const std::byte>)> deliver;
+    BudgetWatch* budget = nullptr;
   };
 
   void subscribe_raw(Receiver& receiver, int queue_capacity);
   static void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel, Receiver* receiver);
+  void watch_peers();
+  void sample_budget();
+  void publish_health(health_t& message);
+  [[nodiscard]] std::string own_trouble() const;
+  [[nodiscard]] double uptime_s() const;
 
-  std::string process_;
-  std::string config_hash_;
+  PeerIdentity identity_;
   lcm::LCM lcm_;
   std::deque<Receiver> receivers_;  // a deque keeps addresses stable
-  std::int64_t failed_sends_ = 0;
+  std::atomic<std::int64_t> failed_sends_ = 0;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point last_health_{};
   std::int8_t last_state_ = -1;
   std::string last_state_text_;
   std::int32_t health_sequence_ = 0;
+  BudgetWatch budget_;
+  PeerWatch peers_;
+  bool watching_peers_ = false;
+  double last_sample_s_ = -1.0;
+  std::int64_t progress_ = 0;
+  ServiceNotifier supervisor_;
 };
 
 }  // namespace ignis::runtime

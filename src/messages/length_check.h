@@ -69,7 +69,7 @@ inline constexpr LayoutStep kLoopResult[] = {{kFixed, 8 + 5 * 4 + 3}, {kString},
 inline constexpr LayoutStep kMapStatus[] = {{kFixed, 8 + 5 * 4 + 8 + 2 * 4 + 8 + 8 + 4 + 8 + 8}, {kString}};
 inline constexpr LayoutStep kPose[] = {{kFixed, 8 + 4 + 10 * 8}};
 inline constexpr LayoutStep kHealth[] = {{kFixed, 8 + 4}, {kString},  {kFixed, 4 + 1}, {kString},
-                                         {kFixed, 4},     {kString},  {kString},       {kFixed, 8},
+                                         {kFixed, 4},     {kString},  {kString},       {kFixed, 9 * 8},
                                          {kCount},        {kStrings}, {kArray, 4 * 8}};
 }  // namespace layouts
 

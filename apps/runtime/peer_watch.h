@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace ignis::runtime {
+
+/// Who a process on the bus is and what it runs with, as its HEALTH tells.
+struct PeerIdentity {
+  std::string process;
+  std::int32_t pid = 0;
+  std::string version;
+  std::string config_hash;
+
+  bool operator==(const PeerIdentity&) const = default;
+};
+
+/// Compares this process with the others on the bus: all must run the same version with the same configuration, and
+/// each executable once. Values in, values out: time comes with the calls.
+class PeerWatch {
+ public:
+  /// [s] without a word after which another process counts as gone; HEALTH comes every second.
+  static constexpr double kForgetAfter_s = 3.0;
+  /// HEALTH messages of a second instance before it is believed: a killed process's last one may still be on its way.
+  static constexpr int kInstanceMessages = 3;
+
+  explicit PeerWatch(PeerIdentity self) : self_(std::move(self)) {}
+
+  /// A HEALTH message arrived at `now_s` [s of any steady clock]. Our own are ignored.
+  void observe(const PeerIdentity& peer, double now_s);
+
+  /// What disagrees among those heard lately, in words; empty when all agree.
+  [[nodiscard]] std::string trouble(double now_s) const;
+
+ private:
+  struct Heard {
+    PeerIdentity peer;
+    double last_s = 0.0;
+    int messages = 0;
+  };
+  [[nodiscard]] std::string disagreement(const Heard& heard) const;
+
+  PeerIdentity self_;
+  std::map<std::pair<std::string, std::int32_t>, Heard> peers_;
+};
+
+}  // namespace ignis::runtime

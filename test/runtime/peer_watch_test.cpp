@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/peer_watch.h"
+
+#include <gtest/gtest.h>
+
+namespace ignis::runtime {
+namespace {
+
+const PeerIdentity kSelf{.process = "lio_frontend", .pid = 10, .version = "1.0", .config_hash = "aa"};
+
+PeerIdentity peer(const std::string& process, std::int32_t pid) {
+  PeerIdentity other = kSelf;
+  other.process = process;
+  other.pid = pid;
+  return other;
+}
+
+TEST(PeerWatch, IsContentWithEqualsAndWithItself) {
+  PeerWatch watch(kSelf);
+  for (int i = 0; i < 10; ++i) {
+    watch.observe(kSelf, i);
+    watch.observe(peer("map_builder", 11), i);
+  }
+  EXPECT_EQ(watch.trouble(9.0), "");
+}
+
+TEST(PeerWatch, NamesWhoseConfigurationDiffers) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = peer("map_builder", 11);
+  other.config_hash = "bb";
+  watch.observe(other, 1.0);
+  EXPECT_EQ(watch.trouble(1.5), "configuration differs from that of map_builder (ours aa, its bb)");
+}
+
+TEST(PeerWatch, NamesWhoseVersionDiffers) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = peer("l1_driver", 12);
+  other.version = "0.9";
+  watch.observe(other, 1.0);
+  EXPECT_EQ(watch.trouble(1.5), "version 1.0 differs from 0.9 of l1_driver");
+}
+
+TEST(PeerWatch, ForgetsWhoFellSilent) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = peer("map_builder", 11);
+  other.config_hash = "bb";
+  watch.observe(other, 1.0);
+  EXPECT_NE(watch.trouble(1.0 + PeerWatch::kForgetAfter_s), "");
+  EXPECT_EQ(watch.trouble(1.1 + PeerWatch::kForgetAfter_s), "");
+}
+
+TEST(PeerWatch, FollowsAPeerThatWasStartedAnewWithOurConfiguration) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = peer("map_builder", 11);
+  other.config_hash = "bb";
+  watch.observe(other, 1.0);
+  watch.observe(peer("map_builder", 13), 2.0);
+  EXPECT_EQ(watch.trouble(1.1 + PeerWatch::kForgetAfter_s), "");
+}
+
+TEST(PeerWatch, BelievesInASecondInstanceOnlyWhenItGoesOn) {
+  PeerWatch watch(kSelf);
+  watch.observe(peer("lio_frontend", 9), 0.0);  // the last word of a killed predecessor
+  EXPECT_EQ(watch.trouble(0.1), "");
+  watch.observe(peer("lio_frontend", 9), 1.0);
+  watch.observe(peer("lio_frontend", 9), 2.0);
+  EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 9)");
+}
+
+}  // namespace
+}  // namespace ignis::runtime

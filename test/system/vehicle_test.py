@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`./ignis up` without systemd in a simulated drive: each process killed in turn is restarted, the drive goes on."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from vehicle_peers import health
+
+from ignis.bus import Listener
+from ignis.pipeline import Pipeline, effective_config
+from ignis.status import all_well, disagreements, page
+
+CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
+CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
+SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
+PORT = 18090
+# The state of the drive is carried on after each; the order is that of the data.
+VICTIMS = ("l1_driver", "lio_frontend", "graph_backend", "map_builder")
+BACK_WITHIN_S = 15.0
+
+
+def command(name: str, *arguments: object, seconds: float = 90.0) -> subprocess.CompletedProcess:
+    line = [sys.executable, "-m", f"ignis.{name}", *map(str, arguments)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=seconds)
+
+
+class Vehicle:
+    """A drive under s6, watched over the bus."""
+
+    def __init__(self, folder: Path, url: str) -> None:
+        self.folder = folder
+        self.listener = Listener(url)
+        self.seconds: dict[str, float] = {}
+        self.voxels_before = 0
+
+    def health(self, process: str) -> Any:
+        """Newest HEALTH of a process."""
+        found = [entry for (name, _), entry in self.listener.health.items() if name == process]
+        return max(found, key=lambda entry: entry[0])[1] if found else None
+
+    def wait(self, condition: Callable[[], bool], seconds: float) -> float:
+        """Seconds until the condition held; fails the test when it does not in time."""
+        began = time.monotonic()
+        while not condition():
+            assert time.monotonic() - began < seconds, page(self.listener, colour=False)
+            self.listener.listen(0.05)
+        return time.monotonic() - began
+
+    def kill(self, process: str, output: str) -> float:
+        """Kills a process; seconds until its successor speaks and its output flows again."""
+        old = self.health(process).pid
+        os.kill(old, signal.SIGKILL)
+        began = time.monotonic()
+        self.wait(lambda: self.health(process).pid != old, BACK_WITHIN_S)
+        back = time.monotonic()
+        self.wait(lambda: self.listener.channels[output].last_at > back, BACK_WITHIN_S)
+        return time.monotonic() - began
+
+
+OUTPUTS = {
+    "l1_driver": "L1_IMU",
+    "lio_frontend": "LIO_STATE",
+    "graph_backend": "SMOOTHED_STATE",
+    "map_builder": "MAP_STATUS",
+}
+
+
+@pytest.fixture(scope="module")
+def vehicle(private_network, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Vehicle]:
+    """A drive in which every process was killed once; the simulated sensor goes on all the time."""
+    folder = tmp_path_factory.mktemp("vehicle")
+    tty = folder / "l1.pty"
+    url = effective_config(CONFIG)["lcm"]["url"]
+    with Pipeline(folder, url) as pipeline:
+        pipeline.start("l1_sim", "--scene", SCENE, "--config", CONFIG, "--pty", tty, "--wait", 60)
+        pipeline.wait_for_text("l1_sim", "waiting", 30.0)
+        driven = Vehicle(folder, url)
+        options = ("--config", CONFIG, "--state", folder / "state")
+        up = command("up", *options, "--port", tty, "--view-port", PORT, "--seconds", 60)
+        assert up.returncode == 0, up.stderr
+        try:
+            driven.wait(lambda: driven.listener.channels.get("LIO_KEYFRAME") is not None, 60.0)
+            driven.listener.listen(8.0)
+            for victim in VICTIMS:
+                driven.seconds[victim] = driven.kill(victim, OUTPUTS[victim])
+                driven.listener.listen(4.0)
+            driven.listener.listen(3.0)
+            yield driven
+        finally:
+            down = command("down", "--state", folder / "state")
+            assert down.returncode == 0, down.stderr
+
+
+def test_every_killed_process_is_back_and_its_output_flows(vehicle: Vehicle) -> None:
+    print({name: round(seconds, 2) for name, seconds in vehicle.seconds.items()})
+    assert set(vehicle.seconds) == set(VICTIMS)
+    assert all(seconds < BACK_WITHIN_S for seconds in vehicle.seconds.values())
+
+
+def test_map_and_graph_go_on_after_the_kills(vehicle: Vehicle) -> None:
+    with urllib.request.urlopen(f"http://127.0.0.1:{PORT}/api/status", timeout=10) as answer:
+        assert json.load(answer)
+
+    def same_keyframes() -> bool:
+        in_graph = vehicle.listener.channels["SMOOTHED_KEYFRAMES"].newest.graph_keyframes
+        in_map = vehicle.listener.channels["MAP_STATUS"].newest.keyframes
+        return in_map >= in_graph > 0
+
+    # The map's successor has asked the front end for every keyframe of the session again.
+    vehicle.wait(same_keyframes, 15.0)
+    assert vehicle.listener.channels["MAP_STATUS"].newest.voxels_local > 1000
+    assert vehicle.health("lio_frontend").state in (0, 1)
+
+
+def test_health_tells_use_against_the_declared_limits(vehicle: Vehicle) -> None:
+    for process in VICTIMS:
+        message = vehicle.health(process)
+        limits = effective_config(CONFIG)["health"][process]
+        assert message.memory_limit_mb == limits["memory_mb"] and message.cpu_limit_percent == limits["cpu_percent"]
+        assert 1.0 < message.memory_mb < limits["memory_mb"]
+        assert message.progress > 0 and message.config_hash and message.version
+    assert sum(vehicle.health(process).cpu_percent for process in VICTIMS) > 0.5
+
+
+def test_processes_agree_about_their_configuration(vehicle: Vehicle) -> None:
+    assert len({vehicle.health(process).config_hash for process in VICTIMS}) == 1
+
+
+def test_status_shows_all_processes(vehicle: Vehicle) -> None:
+    shown = command("status", "--once").stdout
+    print(shown)
+    for word in (*VICTIMS, "LIO_STATE", "L1_IMU"):
+        assert word in shown
+
+
+def test_echo_and_hz_show_the_bus(vehicle: Vehicle) -> None:
+    echoed = command("echo", "LIO_STATE", "--json", "-n", 2, "--seconds", 20)
+    assert echoed.returncode == 0 and len(echoed.stdout.splitlines()) == 2
+    assert len(json.loads(echoed.stdout.splitlines()[0])["position"]) == 3
+    shown = command("hz", "--seconds", 2).stdout
+    assert "state_t" in shown and "HEALTH" in shown
+    assert command("echo", "NO_SUCH_CHANNEL", "--seconds", 0.5).returncode == 1
+
+
+def test_second_up_is_refused(vehicle: Vehicle) -> None:
+    again = command("up", "--config", CONFIG, "--state", vehicle.folder / "state")
+    assert again.returncode == 2 and "already up" in again.stderr
+
+
+def test_processes_with_another_configuration_call_themselves_degraded(private_network, tmp_path: Path) -> None:
+    url = effective_config(CONFIG)["lcm"]["url"].replace(":7667", ":7668")
+    with Pipeline(tmp_path, url) as pipeline:
+        listener = Listener(url)
+        pipeline.start("lio_frontend", "--config", CONFIG)
+        pipeline.start("graph_backend", "--config", CONFIG, "--set", "backend.shadow_swap_m=0.02")
+        deadline = time.monotonic() + 30.0
+
+        def complaints() -> list[str]:
+            newest = (message for _, message in listener.health.values())
+            return [m.process for m in newest if m.state == m.DEGRADED and "configuration differs" in m.state_text]
+
+        while len(complaints()) < 2 and time.monotonic() < deadline:
+            pipeline.check()
+            listener.listen(0.2)
+        assert sorted(complaints()) == ["graph_backend", "lio_frontend"]
+        assert "processes disagree about the configuration" in page(listener, colour=False)
+
+
+def test_status_counts_a_disagreement_and_a_missing_process_as_not_well(private_network) -> None:
+    listener = Listener("memq://")
+    now = time.monotonic()
+    for pid, name in enumerate(VICTIMS):
+        listener.health[(name, pid)] = (now, health(name, pid))
+    assert all_well(listener) and disagreements(listener) == []
+    listener.health[("map_builder", 3)] = (now, health("map_builder", 3, config_hash="bb"))
+    assert not all_well(listener) and "map_builder bb" in disagreements(listener)[0]
+    listener.health[("map_builder", 3)] = (now - 5.0, health("map_builder", 3))
+    assert not all_well(listener) and "GONE" in page(listener, colour=False)
