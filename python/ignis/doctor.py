@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./ignis doctor`: looks at computer, bus, sensor, mount and live data. Findings come with the command that mends them.
+"""`./ignis doctor`: looks at computer, bus, sensor, mount and live data. Each finding has the command that mends it.
 
 Exit code: 0 nothing to do; 9 warnings only; 10 software, 11 host, 12 bus, 13 sensor, 14 mount, 15 data: the first part,
 in this order, that has an error; 2 the configuration or the arguments are wrong.

@@ -61,5 +61,9 @@ def test_commands_in_the_docs_exist_with_the_options_shown(name: str, options: s
         return
     done = subprocess.run([CHECKOUT / "ignis", *name.split(), "--help"], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    missing = {option for option in options if option not in done.stdout}
+    known = done.stdout
+    if name.split()[0] in ("l1", "mount-check"):
+        # Options of l1_tool itself may stand behind its commands.
+        known += subprocess.run([CHECKOUT / "ignis", "l1", "--help"], capture_output=True, text=True).stdout
+    missing = {option for option in options if option not in known}
     assert not missing, f"./ignis {name} does not know {missing}"

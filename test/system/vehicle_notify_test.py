@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Real executables before a supervisor with systemd's protocol: ready, fed from progress, starved when they hang."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from ignis.pipeline import binary
+
+CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
+CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
+WATCHDOG_S = 4.0
+
+
+def heard(listener: socket.socket, seconds: float) -> list[str]:
+    """What arrives on the socket within so long."""
+    messages = []
+    deadline = time.monotonic() + seconds
+    while (left := deadline - time.monotonic()) > 0:
+        listener.settimeout(left)
+        try:
+            messages.append(listener.recv(4096).decode())
+        except TimeoutError:
+            break
+    return messages
+
+
+@pytest.mark.parametrize("name", ["l1_driver", "lio_frontend", "graph_backend", "map_builder"])
+def test_process_says_ready_feeds_the_watchdog_and_starves_it_when_it_hangs(
+    private_network, name: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "notify"
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    listener.bind(str(path))
+    near, far = os.openpty()
+    arguments = {"l1_driver": ["--port", os.ttyname(far)], "map_builder": ["--port", "0"]}.get(name, [])
+    environment = {**os.environ, "NOTIFY_SOCKET": str(path), "WATCHDOG_USEC": str(int(WATCHDOG_S * 1e6))}
+    process = subprocess.Popen(
+        [binary(name), "--config", CONFIG, *arguments], env=environment, stdout=subprocess.DEVNULL
+    )
+    try:
+        assert "READY=1" in heard(listener, 10.0 if name == "map_builder" else 5.0)
+        assert heard(listener, WATCHDOG_S).count("WATCHDOG=1") >= 2
+        process.send_signal(signal.SIGSTOP)
+        heard(listener, 0.2)
+        assert heard(listener, WATCHDOG_S) == []
+        process.send_signal(signal.SIGCONT)
+        assert "WATCHDOG=1" in heard(listener, WATCHDOG_S)
+        process.terminate()
+        assert process.wait(15) == 0
+    finally:
+        process.kill()
+        process.wait()
+        listener.close()
+        os.close(near)
+        os.close(far)
