@@ -39,11 +39,12 @@ def test_page_held_what_the_status_page_says(drive: LiveDrive) -> None:
     held = {(frame["revision"], frame["checksum"], tuple(frame["counts"])) for frame in drive.applied.values()}
     views = [view for status in drive.statuses for view in status["views"] if view["utime"] > 0]
     revisions = {view["revision"] for view in views}
+    shown_revisions = {frame["revision"] for frame in drive.applied.values()}
     agreed = [view for view in views if (view["revision"], view["checksum"], tuple(view["counts"])) in held]
     assert len(revisions) > 5
-    # The status is a second old at most; a picture between two that this viewer was sent is none of its frames.
-    assert len(agreed) > 0.7 * len(views)
-    assert {view["revision"] for view in agreed} >= revisions - {max(revisions)}
+    assert shown_revisions >= revisions - {max(revisions)}
+    # The status names one picture a second; while this viewer was busy it may be one between two of its frames.
+    assert len(agreed) > 0.7 * len(views), (len(agreed), len(views))
 
 
 def test_figures_equal_the_published_pose(drive: LiveDrive) -> None:

@@ -83,10 +83,10 @@ describe("small things", () => {
   it("the reporter reports a changed radius once, not too often, and clamped", () => {
     const sent: number[] = [];
     const reporter = new ViewReporter((radius) => sent.push(radius));
-    for (const [radius, now] of [[20, 0], [20.5, 500], [30, 600], [30, 700], [40, 800], [40, 900], [9e9, 2000]]) {
+    for (const [radius, now] of [[20, 0], [20.5, 500], [30, 600], [30, 700], [40, 800], [50, 900], [9e9, 2000]]) {
       reporter.update(radius, 150, now);
     }
-    expect(sent).toEqual([20, 30, 40, 150]);
+    expect(sent).toEqual([20, 30, 50, 150]);
     reporter.forget();
     expect(reporter.update(40, 150, 2001)).toBe(40);
   });
