@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map_builder/view_client.h"
 
+#include <array>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include <boost/asio/as_tuple.hpp>
@@ -33,6 +35,7 @@ constexpr double kRequestBurst = 60.0;
 constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one step share pictures and frames
 constexpr std::chrono::seconds kLifeTimeout{10};
 constexpr std::chrono::milliseconds kSlowRoundTrip{500};
+constexpr std::chrono::seconds kDrainTime{2};
 
 SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
 
@@ -57,7 +60,24 @@ net::awaitable<void> ViewClient::serve(const Request& upgrade) {
   context_.on_view_changed();
   net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, net::detached);
   co_await read_loop();
+  open_ = false;
+  wake();
+  if (violated_) co_await drain();
   close();
+}
+
+/// Takes in what is still on its way. A socket that is closed with bytes unread resets the connection, and the viewer
+/// might never read why it was closed.
+net::awaitable<void> ViewClient::drain() {
+  beast::tcp_stream& tcp = beast::get_lowest_layer(stream_);
+  beast::error_code ignored;
+  std::ignore = tcp.socket().shutdown(net::socket_base::shutdown_send, ignored);
+  tcp.expires_after(kDrainTime);
+  std::array<char, 4096> scrap{};
+  while (true) {
+    const auto [error, bytes] = co_await tcp.async_read_some(net::buffer(scrap), kNoThrow);
+    if (error) break;
+  }
 }
 
 net::awaitable<void> ViewClient::read_loop() {
@@ -100,7 +120,10 @@ void ViewClient::count_failure(const beast::error_code& error) {
     ++context_.counters.oversized;
   } else if (error == websocket::condition::protocol_violation) {
     ++context_.counters.protocol_errors;
+  } else {
+    return;
   }
+  violated_ = true;
 }
 
 void ViewClient::on_control(websocket::frame_type kind) {

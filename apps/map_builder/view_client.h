@@ -68,6 +68,7 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
 
  private:
   boost::asio::awaitable<void> read_loop();
+  boost::asio::awaitable<void> drain();
   boost::asio::awaitable<void> refuse(boost::beast::websocket::close_code code);
   boost::asio::awaitable<void> write_loop();
   boost::asio::awaitable<bool> write_news();
@@ -91,6 +92,7 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   RateLimit requests_;
   int bad_requests_ = 0;
   bool too_demanding_ = false;  // asks faster than allowed, or does not read its answers
+  bool violated_ = false;       // RFC 6455, so the stream has told it why and ended
   bool open_ = false;
   bool awaits_pong_ = false;
   bool wrote_ = false;

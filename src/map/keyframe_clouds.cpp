@@ -13,8 +13,6 @@
 namespace ignis {
 namespace {
 
-constexpr double kBlockMetres = 2.0;
-
 CellIndex cell_of(const Eigen::Vector3d& p, double per_metre) {
   return {floor_to_int(p.x() * per_metre), floor_to_int(p.y() * per_metre), floor_to_int(p.z() * per_metre)};
 }
@@ -26,19 +24,28 @@ std::optional<CloudPoint> sound(const Eigen::Vector3d& p, float intensity) {
   return CloudPoint{p.cast<float>(), intensity > 0.0F ? std::min(intensity, 255.0F) : 0.0F};
 }
 
-/// Neighbours in space become neighbours in memory, so that whoever reads the cloud stays in one tile for long.
-void sort_by_block(std::vector<CloudPoint>& points) {
+/// Neighbours in space become neighbours in memory, in blocks.
+void sort_into_blocks(CloudData& cloud) {
   std::vector<std::pair<CellKey, std::uint32_t>> order;
-  order.reserve(points.size());
-  for (const CloudPoint& point : points) {
-    const CellIndex block = cell_of(point.position.cast<double>(), 1.0 / kBlockMetres);
+  order.reserve(cloud.points.size());
+  for (const CloudPoint& point : cloud.points) {
+    const CellIndex block = cell_of(point.position.cast<double>(), 1.0 / CloudBlock::kEdge);
     order.emplace_back(pack(block), static_cast<std::uint32_t>(order.size()));
   }
   std::ranges::sort(order);
   std::vector<CloudPoint> sorted;
-  sorted.reserve(points.size());
-  for (const auto& [block, index] : order) sorted.push_back(points[index]);
-  points = std::move(sorted);
+  sorted.reserve(cloud.points.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i == 0 || order[i].first != order[i - 1].first) {
+      const CellIndex block = unpack(order[i].first);
+      const Eigen::Vector3d centre =
+          CloudBlock::kEdge * (Eigen::Vector3d(block.x, block.y, block.z) + Eigen::Vector3d::Constant(0.5));
+      cloud.blocks.push_back({centre.cast<float>(), static_cast<std::uint32_t>(i), 0});
+    }
+    cloud.blocks.back().end = static_cast<std::uint32_t>(i + 1);
+    sorted.push_back(cloud.points[order[i].second]);
+  }
+  cloud.points = std::move(sorted);
 }
 
 }  // namespace
@@ -61,8 +68,9 @@ KeyframeClouds::Kept KeyframeClouds::add_keyframe(std::int32_t id, std::span<con
   for (const CloudPoint& point : points_body) {
     if (const auto kept = sound(point.position.cast<double>(), point.intensity)) cloud->points.push_back(*kept);
   }
-  sort_by_block(cloud->points);
+  sort_into_blocks(*cloud);
   closed_points_ += cloud->points.size();
+  blocks_ += cloud->blocks.size();
   const std::span<const CloudPoint> kept = cloud->points;
   entries_[id] = {T_odom_keyframe, std::move(cloud)};
   return {id, kept};
@@ -96,9 +104,11 @@ void KeyframeClouds::close_newest() {
   if (entries_.empty()) return;
   auto cloud = std::make_shared<CloudData>();
   cloud->points = std::exchange(open_points_, {});
-  sort_by_block(cloud->points);
+  open_points_.reserve(cloud->points.size());  // the next one will be like it
+  sort_into_blocks(*cloud);
   if (open_free_) cloud->free = open_free_->take();
   closed_points_ += cloud->points.size();
+  blocks_ += cloud->blocks.size();
   free_cells_ += cloud->free.size();
   entries_.rbegin()->second.cloud = std::move(cloud);
   open_cells_.clear();
@@ -127,6 +137,7 @@ void KeyframeClouds::drop(std::span<const std::int32_t> ids) {
   for (const std::int32_t id : ids) {
     const auto entry = entries_.find(id);
     closed_points_ -= entry->second.cloud->points.size();
+    blocks_ -= entry->second.cloud->blocks.size();
     free_cells_ -= entry->second.cloud->free.size();
     entries_.erase(entry);
     ++dropped_;
@@ -138,23 +149,23 @@ void KeyframeClouds::clear() {
   open_points_ = {};
   open_cells_.clear();
   if (open_free_) std::ignore = open_free_->take();
-  closed_points_ = free_cells_ = 0;
+  closed_points_ = blocks_ = free_cells_ = 0;
 }
 
 std::size_t KeyframeClouds::bytes() const {
-  return points() * sizeof(CloudPoint) + open_cells_.bucket_count() * (sizeof(CellKey) + 1) +
-         entries_.size() * sizeof(decltype(entries_)::value_type) + free_cells_ * sizeof(FreeCell) +
-         (open_free_ ? open_free_->bytes() : 0);
+  return points() * sizeof(CloudPoint) + blocks_ * sizeof(CloudBlock) +
+         open_cells_.bucket_count() * (sizeof(CellKey) + 1) + entries_.size() * sizeof(decltype(entries_)::value_type) +
+         free_cells_ * sizeof(FreeCell) + (open_free_ ? open_free_->bytes() : 0);
 }
 
 StoredCloud KeyframeClouds::view(std::int32_t id) const {
   const Entry& entry = entries_.at(id);
-  return entry.cloud ? view_of(*entry.cloud) : StoredCloud{open_points_, {}};
+  return entry.cloud ? view_of(*entry.cloud) : StoredCloud{open_points_, {}, {}};
 }
 
 SharedCloud KeyframeClouds::share(std::int32_t id) const {
   const Entry& entry = entries_.at(id);
-  return entry.cloud ? entry.cloud : std::make_shared<const CloudData>(CloudData{open_points_, {}});
+  return entry.cloud ? entry.cloud : std::make_shared<const CloudData>(CloudData{open_points_, {}, {}});
 }
 
 }  // namespace ignis

@@ -26,8 +26,8 @@ namespace ignis {
 /// changes. What is seen before the first keyframe belongs to a stand-in with the id kBeforeFirst.
 ///
 /// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped,
-/// and when the open one alone is that large, it takes no more. Memory: 16 bytes per point, and for the open keyframe 9
-/// to 21 bytes per cell beside. With rays followed, 4 bytes per free cell.
+/// and when the open one alone is that large, it takes no more. Memory: 16 bytes per point, 20 per block of 2 m, and
+/// for the open keyframe 9 to 21 bytes per cell beside. With rays followed, 4 bytes per free cell.
 class KeyframeClouds {
  public:
   static constexpr std::int32_t kBeforeFirst = -1;
@@ -89,7 +89,8 @@ class KeyframeClouds {
   std::vector<CloudPoint> open_points_;
   boost::unordered_flat_set<CellKey> open_cells_;
   std::optional<FreeSpace> open_free_;
-  std::size_t free_cells_ = 0;  // of the closed ones
+  std::size_t blocks_ = 0;  // of the closed ones, as are the free cells
+  std::size_t free_cells_ = 0;
   std::size_t closed_points_ = 0;
   std::int64_t dropped_ = 0;
 };

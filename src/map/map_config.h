@@ -25,8 +25,8 @@ struct MapConfig {
   double rebuild_turn_rad = 0.001;
   int reanchor_points = 300'000;
   bool carve_free_space = false;
-  int carve_rays = 10;
-  int carve_keyframes = 2;
+  int carve_rays = 3;
+  int carve_keyframes = 1;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.number("local_cell_m", self.local_cell_m, {0.01, 2.0}, "m", "cell of the local level");
@@ -70,7 +70,7 @@ struct MapConfig {
     };
     const char* const kNesting = "a whole multiple (2 or more) of the next finer cell";
     const double finest = std::max(local_cell_m, 1e-9);
-    if (coarse_cell_m / finest > kMaxCellRatio + 0.5) refuse("coarse_cell_m", coarse_cell_m, "at most 64 local cells");
+    if (coarse_cell_m / finest > kMaxCellRatio + 0.5) refuse("coarse_cell_m", coarse_cell_m, "at most 16 local cells");
     if (!nests(local_cell_m, mid_cell_m)) refuse("mid_cell_m", mid_cell_m, kNesting);
     if (!nests(mid_cell_m, coarse_cell_m)) refuse("coarse_cell_m", coarse_cell_m, kNesting);
     if (!(mid_window_m > local_window_m)) refuse("mid_window_m", mid_window_m, "more than local_window_m");
@@ -84,7 +84,7 @@ struct MapConfig {
   }
 
   static constexpr double kMaxRelativeIndex = 32000.0;
-  static constexpr double kMaxCellRatio = 64.0;  // a tile numbers its cells in 32 bits
+  static constexpr double kMaxCellRatio = 16.0;  // tables over the cells of a tile stay small
 };
 
 }  // namespace ignis

@@ -42,7 +42,10 @@ class PictureBuilder {
   double radius_m_;
   boost::unordered_flat_map<CellKey, Cached> cache_;
   std::uint64_t builds_ = 0;
-  std::array<std::vector<std::uint8_t>, kLevels> covered_;  // scratch: cells of a tile that a finer voxel covers
+  // Scratch of one tile: cells that a finer voxel covers; the voxels by cell, and which cells have one.
+  std::array<std::vector<std::uint8_t>, kLevels> covered_;
+  std::vector<std::uint64_t> by_cell_;
+  std::vector<std::uint64_t> occupied_;
 };
 
 }  // namespace ignis

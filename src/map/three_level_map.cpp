@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "common/config_check.h"
 #include "common/fingerprint.h"
@@ -17,6 +18,8 @@ constexpr double kMaxNormError = 1e-3;
 constexpr double kFollowRatio = 0.75;
 constexpr int kStepsOfLevels = 2;  // coarsening takes the local and the mid level away first
 constexpr double kNarrowing = 0.8;
+// Half the diagonal of a block, and what rounding to float may add.
+constexpr double kBlockRadius = 0.5 * std::numbers::sqrt3 * CloudBlock::kEdge + 1e-3;
 
 const MapConfig& checked(const MapConfig& config) {
   config::require_valid(config, "map");
@@ -141,7 +144,8 @@ InsertCounts ThreeLevelMap::insert(std::int32_t id, std::span<const CloudPoint> 
     if (tile == nullptr || tile->index() != location.tile) {
       const CellKey key = pack(location.tile);
       tile = &tile_of(key, location.tile);
-      if (std::ranges::find(tile->clouds, id) == tile->clouds.end()) {
+      const bool is_newest = !tile->clouds.empty() && tile->clouds.back() == id;
+      if (!is_newest && std::ranges::find(tile->clouds, id) == tile->clouds.end()) {
         tile->clouds.push_back(id);
         cloud.tiles.push_back(key);
       }
@@ -249,13 +253,20 @@ void ThreeLevelMap::refill(const std::vector<CellKey>& tiles, const CloudLookup&
   std::ranges::sort(ids);
   ids.erase(std::ranges::unique(ids).begin(), ids.end());
   for (const std::int32_t id : ids) {
+    const Pose& T_world_cloud = clouds_.at(id).T_world_cloud;
+    const StoredCloud cloud = clouds(id);
     Tile* tile = nullptr;
-    for_each_placed(clouds_.at(id).T_world_cloud, clouds(id).points,
-                    [&](const CloudPoint& point, const Location& location) {
-                      if (tile == nullptr || tile->index() != location.tile)
-                        tile = tiles_.at(pack(location.tile)).get();
-                      if (tile->refilling != 0) enter(*tile, location, tile->refilling, point.intensity, id);
-                    });
+    const auto offer = [&](std::span<const CloudPoint> points) {
+      for_each_placed(T_world_cloud, points, [&](const CloudPoint& point, const Location& location) {
+        if (tile == nullptr || tile->index() != location.tile) tile = tiles_.at(pack(location.tile)).get();
+        if (tile->refilling != 0) enter(*tile, location, tile->refilling, point.intensity, id);
+      });
+    };
+    if (cloud.blocks.empty()) offer(cloud.points);
+    for (const CloudBlock& block : cloud.blocks) {
+      if (!reaches_refilling_tile(T_world_cloud * Eigen::Vector3d(block.centre.cast<double>()), kBlockRadius)) continue;
+      offer(cloud.points.subspan(block.begin, block.end - block.begin));
+    }
   }
   for (const CellKey key : tiles) {
     Tile& tile = *tiles_.at(key);
@@ -264,19 +275,36 @@ void ThreeLevelMap::refill(const std::vector<CellKey>& tiles, const CloudLookup&
   }
 }
 
-std::size_t ThreeLevelMap::cost_of_moving(std::span<const std::int32_t> ids, const CloudLookup& clouds) const {
-  std::vector<std::int32_t> readers;
-  std::size_t cost = 0;
-  for (const std::int32_t id : ids) {
-    cost += clouds(id).points.size();
-    for (const CellKey key : clouds_.at(id).tiles) {
-      const Tile& tile = *tiles_.at(key);
-      if (tile.held != 0) readers.insert(readers.end(), tile.clouds.begin(), tile.clouds.end());
+bool ThreeLevelMap::reaches_refilling_tile(const Eigen::Vector3d& centre, double radius) const {
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius);
+  const Eigen::Vector3i first = cell_of<double>((centre - reach) / grid_.tile_m());
+  const Eigen::Vector3i last = cell_of<double>((centre + reach) / grid_.tile_m());
+  for (int x = first.x(); x <= last.x(); ++x) {
+    for (int y = first.y(); y <= last.y(); ++y) {
+      for (int z = first.z(); z <= last.z(); ++z) {
+        const auto tile = tiles_.find(pack({x, y, z}));
+        if (tile != tiles_.end() && tile->second->refilling != 0) return true;
+      }
     }
-    std::ranges::sort(readers);
-    readers.erase(std::ranges::unique(readers).begin(), readers.end());
   }
-  for (const std::int32_t id : readers) cost += clouds(id).points.size();
+  return false;
+}
+
+std::size_t ThreeLevelMap::cost_of_moving(std::span<const std::int32_t> ids, const CloudLookup& clouds) const {
+  std::size_t cost = 0;
+  std::vector<CellKey> tiles;
+  for (const std::int32_t id : ids) {
+    const std::vector<CellKey>& touched = clouds_.at(id).tiles;
+    cost += clouds(id).points.size();
+    tiles.insert(tiles.end(), touched.begin(), touched.end());
+  }
+  std::ranges::sort(tiles);
+  tiles.erase(std::ranges::unique(tiles).begin(), tiles.end());
+  for (const CellKey key : tiles) {
+    const Tile& tile = *tiles_.at(key);
+    if (tile.held == 0) continue;
+    for (const std::int32_t id : tile.clouds) cost += clouds(id).points.size() / clouds_.at(id).tiles.size();
+  }
   return cost;
 }
 

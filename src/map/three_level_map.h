@@ -132,6 +132,7 @@ class ThreeLevelMap {
   void refill_all_levels(std::vector<CellKey>& tiles, const CloudLookup& clouds);
   void refill(const std::vector<CellKey>& tiles, const CloudLookup& clouds);
   void clear_levels(Tile& tile, LevelSet levels);
+  [[nodiscard]] bool reaches_refilling_tile(const Eigen::Vector3d& centre, double radius) const;
 
   /// Calls visit(point, p_world, location) for the points of a cloud that the map can hold.
   template <class Visit>

@@ -76,6 +76,26 @@ TEST(KeyframeClouds, ClosingLosesAndAddsNothing) {
   EXPECT_EQ(clouds.points(), open.size() + clouds.view(1).points.size());
 }
 
+TEST(KeyframeClouds, BlocksOfAClosedCloudHoldAllItsPointsEachWithinItsCube) {
+  std::mt19937 generator(7);
+  KeyframeClouds clouds(kCell, 1'000'000);
+  clouds.add_keyframe(0, random_cloud(generator, 3'000, 15, 4), Pose{});
+  EXPECT_TRUE(clouds.view(0).blocks.empty()) << "an open cloud is in no order";
+  clouds.add_keyframe(1, {}, Pose{});
+  const StoredCloud cloud = clouds.view(0);
+  std::uint32_t next = 0;
+  for (const CloudBlock& block : cloud.blocks) {
+    EXPECT_EQ(block.begin, next);
+    ASSERT_LT(block.begin, block.end);
+    for (const CloudPoint& point : cloud.points.subspan(block.begin, block.end - block.begin)) {
+      EXPECT_LE((point.position - block.centre).cwiseAbs().maxCoeff(), static_cast<float>(0.5 * CloudBlock::kEdge));
+    }
+    next = block.end;
+  }
+  EXPECT_EQ(next, cloud.points.size());
+  EXPECT_GT(cloud.blocks.size(), 100U);
+}
+
 TEST(KeyframeClouds, ASharedCloudDoesNotChangeAnyMore) {
   std::mt19937 generator(2);
   KeyframeClouds clouds(kCell, 1'000'000);

@@ -27,7 +27,7 @@ def test_a_drive_shows_walls_where_they_are_on_all_three_levels(running):
     pose, levels = viewer.view()
     odometry, smoothed, edges = viewer.state.odometry, viewer.state.smoothed, viewer.state.edges
     assert np.allclose(pose[:3], drive.position() - [0, 0, -SPEED * SCAN_PERIOD], atol=1e-3)
-    for points, flags in levels:
+    for points, _ in levels:
         assert len(points) > 100
         on_a_surface = (np.abs(np.abs(points[:, 0]) - WALL_X) < 0.5) | (np.abs(points[:, 1] + 0.5) < 0.5)
         assert on_a_surface.all()

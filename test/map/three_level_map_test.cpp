@@ -24,7 +24,7 @@ struct World {
   explicit World(const MapConfig& c = {}) : config(c), map(c) {}
 
   [[nodiscard]] ThreeLevelMap::CloudLookup lookup() const {
-    return [this](std::int32_t id) { return StoredCloud{store.at(id), {}}; };
+    return [this](std::int32_t id) { return StoredCloud{store.at(id), {}, {}}; };
   }
   InsertCounts add(std::int32_t id, std::vector<CloudPoint> points, const Pose& pose) {
     store[id] = std::move(points);
@@ -38,7 +38,7 @@ struct World {
                    .coarsening = map.coarsening(),
                    .open_cloud = {}};
     for (const auto& [id, points] : store) {
-      job.clouds.push_back({id, std::make_shared<const CloudData>(CloudData{points, {}}), map.pose(id)});
+      job.clouds.push_back({id, std::make_shared<const CloudData>(CloudData{points, {}, {}}), map.pose(id)});
     }
     return job;
   }
