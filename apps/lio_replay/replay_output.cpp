@@ -214,9 +214,8 @@ Json report(const runtime::Application& application, const ReplaySource& source,
                            {"half_chi_square_incremental", result.optimum.half_chi_square_before},
                            {"swapped_in", result.smoother.shadow_swaps > 0}};
   json["solver_rebuilds"] = result.smoother.solver_rebuilds;
-  json["voxels"] = {{"local", pipeline.voxels().size(0)},
-                    {"mid", pipeline.voxels().size(1)},
-                    {"coarse", pipeline.voxels().size(2)}};
+  json["voxels"] = {
+      {"local", pipeline.voxels().size(0)}, {"mid", pipeline.voxels().size(1)}, {"coarse", pipeline.voxels().size(2)}};
   json["trajectory_hash"] = trajectory_hash(result);
   json["map_hash"] = pipeline.voxels().fingerprint();
   json["timing"] = {{"wall_s", timing.wall_s},
