@@ -2,6 +2,7 @@
 """map_builder as a child process, and a client that sees raw WebSocket frames."""
 
 import base64
+import contextlib
 import json
 import os
 import re
@@ -129,7 +130,9 @@ class WebSocket:
             opcode, payload = self.receive_one()
             if opcode != 9:
                 return opcode, payload
-            self.send(payload, opcode=10)
+            # A server that has closed already answers no more, but its close frame is still to be read.
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+                self.send(payload, opcode=10)
 
     def until(self, wanted):
         while True:

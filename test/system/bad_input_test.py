@@ -95,7 +95,8 @@ def test_replay_lists_the_channels_of_a_foreign_log(run_binary, tmp_path: Path) 
         log.write_event(number, "CAMERA", b"12345678")
     log.close()
     message = refusal(run_binary("lio_replay", tmp_path / "foreign.lcmlog", "--out", tmp_path / "out"), 2)
-    assert "L1_IMU" in message and "CAMERA (3)" in message
+    assert "L1_IMU" in message and "type 0x3132333435363738, which is none of ours" in message
+    assert " ".join(message.split()).count("CAMERA 3 messages") == 1
 
 
 def test_simulator_refuses_an_unknown_scene(run_binary, tmp_path: Path) -> None:
