@@ -2,6 +2,7 @@
 """map_builder as a child process, and a client that sees raw WebSocket frames."""
 
 import base64
+import contextlib
 import json
 import os
 import re
@@ -129,7 +130,9 @@ class WebSocket:
             opcode, payload = self.receive_one()
             if opcode != 9:
                 return opcode, payload
-            self.send(payload, opcode=10)
+            # The server may have gone already, and why stands behind the ping.
+            with contextlib.suppress(OSError):
+                self.send(payload, opcode=10)
 
     def until(self, wanted):
         while True:
