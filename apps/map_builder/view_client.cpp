@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map_builder/view_client.h"
 
-#include <array>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
-#include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
@@ -35,7 +32,6 @@ constexpr double kRequestBurst = 60.0;
 constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one step share pictures and frames
 constexpr std::chrono::seconds kLifeTimeout{10};
 constexpr std::chrono::milliseconds kSlowRoundTrip{500};
-constexpr std::chrono::seconds kDrainTime{2};
 
 SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
 
@@ -45,6 +41,7 @@ ViewClient::ViewClient(std::int64_t id, Stream stream, ViewerContext& context)
     : id_(id),
       stream_(std::move(stream)),
       wake_(stream_.get_executor(), net::steady_timer::time_point::max()),
+      answered_(stream_.get_executor(), net::steady_timer::time_point::max()),
       context_(context),
       view_radius_(std::min(kDefaultViewRadius, context.max_view_radius_m)),
       requests_(kRequestsPerSecond, kRequestBurst) {}
@@ -60,24 +57,7 @@ net::awaitable<void> ViewClient::serve(const Request& upgrade) {
   context_.on_view_changed();
   net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, net::detached);
   co_await read_loop();
-  open_ = false;
-  wake();
-  if (violated_) co_await drain();
   close();
-}
-
-/// Takes in what is still on its way. A socket that is closed with bytes unread resets the connection, and the viewer
-/// might never read why it was closed.
-net::awaitable<void> ViewClient::drain() {
-  beast::tcp_stream& tcp = beast::get_lowest_layer(stream_);
-  beast::error_code ignored;
-  std::ignore = tcp.socket().shutdown(net::socket_base::shutdown_send, ignored);
-  tcp.expires_after(kDrainTime);
-  std::array<char, 4096> scrap{};
-  while (true) {
-    const auto [error, bytes] = co_await tcp.async_read_some(net::buffer(scrap), kNoThrow);
-    if (error) break;
-  }
 }
 
 net::awaitable<void> ViewClient::read_loop() {
@@ -98,7 +78,7 @@ net::awaitable<void> ViewClient::read_loop() {
     if (!too_demanding_) handle(beast::buffers_to_string(buffer.data()));
     buffer.consume(buffer.size());
     // The answer goes out before the next message is looked at, which may be one that ends the connection.
-    co_await net::post(stream_.get_executor(), net::use_awaitable);
+    while (open_ && !answers_.empty() && !answers_.front().binary) co_await answered_.async_wait(kNoThrow);
     if (too_demanding_ || bad_requests_ > kMaxBadRequests) {
       ++context_.counters.policy_closes;
       co_await refuse(websocket::close_code::policy_error);
@@ -120,10 +100,7 @@ void ViewClient::count_failure(const beast::error_code& error) {
     ++context_.counters.oversized;
   } else if (error == websocket::condition::protocol_violation) {
     ++context_.counters.protocol_errors;
-  } else {
-    return;
   }
-  violated_ = true;
 }
 
 void ViewClient::on_control(websocket::frame_type kind) {
@@ -180,6 +157,7 @@ void ViewClient::check_life(TimePoint now) {
 void ViewClient::close() {
   open_ = false;
   wake();
+  answered_.cancel();
   beast::get_lowest_layer(stream_).cancel();
 }
 
@@ -188,7 +166,11 @@ net::awaitable<void> ViewClient::write_loop() {
   while (open_) {
     wrote_ = false;
     // A failed write ends the writing alone: the reader may be in the middle of telling the viewer why it is closed.
-    if (!co_await (awaits_pong_ ? write_short_answers() : write_news())) co_return;
+    if (!co_await (awaits_pong_ ? write_short_answers() : write_news())) {
+      answers_.clear();
+      answered_.cancel();
+      co_return;
+    }
     if (!wrote_ && open_) co_await wake_.async_wait(kNoThrow);
   }
 }
@@ -221,21 +203,25 @@ net::awaitable<bool> ViewClient::write_texts() {
 /// Texts alone need not wait for the pong of the batch before: their number is bounded by what the viewer asks.
 net::awaitable<bool> ViewClient::write_short_answers() {
   while (!answers_.empty() && !answers_.front().binary) {
-    const Answer answer = std::move(answers_.front());
-    answers_.pop_front();
-    if (!co_await write_message(false, answer.text)) co_return false;
+    if (!co_await write_answer()) co_return false;
   }
   co_return true;
 }
 
 net::awaitable<bool> ViewClient::write_answers() {
   while (!answers_.empty()) {
-    const Answer answer = std::move(answers_.front());
-    answers_.pop_front();
-    if (!co_await write_message(false, answer.text)) co_return false;
-    if (answer.binary && !co_await write_message(true, answer.binary)) co_return false;
+    if (!co_await write_answer()) co_return false;
   }
   co_return true;
+}
+
+net::awaitable<bool> ViewClient::write_answer() {
+  const Answer answer = answers_.front();
+  const bool written =
+      co_await write_message(false, answer.text) && (!answer.binary || co_await write_message(true, answer.binary));
+  answers_.pop_front();
+  answered_.cancel();
+  co_return written;
 }
 
 net::awaitable<bool> ViewClient::write_frame() {

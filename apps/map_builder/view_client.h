@@ -68,13 +68,13 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
 
  private:
   boost::asio::awaitable<void> read_loop();
-  boost::asio::awaitable<void> drain();
   boost::asio::awaitable<void> refuse(boost::beast::websocket::close_code code);
   boost::asio::awaitable<void> write_loop();
   boost::asio::awaitable<bool> write_news();
   boost::asio::awaitable<bool> write_texts();
   boost::asio::awaitable<bool> write_short_answers();
   boost::asio::awaitable<bool> write_answers();
+  boost::asio::awaitable<bool> write_answer();
   boost::asio::awaitable<bool> write_frame();
   boost::asio::awaitable<bool> write_message(bool binary, SharedBytes message);
   void on_control(boost::beast::websocket::frame_type kind);
@@ -83,7 +83,8 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
 
   std::int64_t id_;
   Stream stream_;
-  boost::asio::steady_timer wake_;
+  boost::asio::steady_timer wake_;      // ends its wait when there is news
+  boost::asio::steady_timer answered_;  // and this one when an answer is out
   ViewerContext& context_;
   double view_radius_;
   ViewBoard::Seen seen_;
@@ -92,7 +93,6 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   RateLimit requests_;
   int bad_requests_ = 0;
   bool too_demanding_ = false;  // asks faster than allowed, or does not read its answers
-  bool violated_ = false;       // RFC 6455, so the stream has told it why and ended
   bool open_ = false;
   bool awaits_pong_ = false;
   bool wrote_ = false;
