@@ -235,7 +235,7 @@ def test_implausible_mount_is_found(change: dict, words: str) -> None:
         ({"accel": (0.0, 1.0, 0.0)}, "gravity", Severity.ERROR, "the unit is g"),
         ({"accel": (0.0, 8.0, 0.0)}, "gravity", Severity.ERROR, "8.00 m/s^2 instead of 9.81"),
         ({"gyro": (0.0, 40.0, 0.0)}, "rest", Severity.ERROR, "degrees instead of radians"),
-        ({"accel": (0.0, 6.937, -6.937)}, "mount angle", Severity.WARNING, "pitch +45.0"),
+        ({"accel": (0.0, 7.586, -6.220)}, "mount angle", Severity.WARNING, "pitch +39.3"),
         ({"accel": (0.0, -9.81, 0.0)}, "mount angle", Severity.ERROR, "180.0 degrees off vertical"),
         ({"imu_hz": 100.0}, "L1_IMU", Severity.ERROR, "Hz instead of 250"),
         ({"lose_every": 50}, "L1_IMU", Severity.WARNING, "messages missing"),
