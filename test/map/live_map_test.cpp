@@ -141,6 +141,17 @@ TEST(LiveMap, WhatCameBeforeTheFirstKeyframeMovesWithIt) {
   EXPECT_FALSE(shows(map, {0, 1, -2}));
 }
 
+TEST(LiveMap, ACorrectionThatCameBeforeItsKeyframeTakesTheStandInAlong) {
+  LiveMap map(MapConfig{});
+  const CloudPoint point{{0.0F, 1.0F, -2.0F}, 1.0F};
+  map.insert_scan(std::span(&point, 1), pose_at(0, 0, 0));
+  const CorrectedPose corrected{0, pose_at(1, 0, 3)};
+  map.correct(Pose{}, std::span(&corrected, 1));
+  map.add_keyframe(keyframe(0, pose_at(1, 0, 0)));
+  EXPECT_TRUE(shows(map, {0, 1, 1}));
+  EXPECT_FALSE(shows(map, {0, 1, -2}));
+}
+
 TEST(LiveMap, OnlyTheNewestKeyframeIsOpen) {
   LiveMap map(MapConfig{});
   drive(map, 6);
