@@ -14,7 +14,9 @@ BackendConfig with_loops(BackendConfig config, bool use_loops) {
 ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops)
     : lio_(config.frontend.filter),
       smoother_(with_loops(config.backend, use_loops), config.frontend.loop_gates),
-      map_(config.map) {}
+      map_(config.map) {
+  map_.draw_at_rebuild();  // finish() does; nobody looks before
+}
 
 void ReplayPipeline::add_imu(const ImuSample& sample) {
   const ImuResult imu = frontend_timer_.time([&] { return lio_.add_imu(sample); });
@@ -61,7 +63,6 @@ void ReplayPipeline::correct_map(const SmootherUpdate& update) {
   poses.reserve(update.moved.size());
   for (const KeyframePose& pose : update.moved) poses.push_back({pose.id, pose.T_map_body});
   map_.correct(update.T_map_odom, poses);
-  if (map_.needs_rebuild()) rebuild_map();
 }
 
 void ReplayPipeline::rebuild_map() {

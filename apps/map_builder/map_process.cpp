@@ -25,7 +25,7 @@ constexpr std::size_t kMaxRequestedIds = 32;
 constexpr int kMaxRequests = 5;  // the front end keeps a ring: what it no longer has will never come
 
 // Complete paths are sent whenever they change, so a long drive's are sent less often.
-constexpr double kPathBytesPerSecond = 40'000.0;
+constexpr double kPathBytesPerSecond = 15'000.0;
 constexpr double kPathPointBytes = 12.0;
 constexpr std::chrono::milliseconds kMinPathPeriod{300};
 constexpr int kHealthQueue = 100;

@@ -12,10 +12,29 @@ namespace ignis {
 namespace {
 
 constexpr std::int32_t kFree = -1;
-constexpr std::size_t kFirstCapacity = 1024;
+constexpr std::size_t kFirstCapacity = 256;
 constexpr int kEdgeBits = 2;
 
-/// masks[axis][lo][hi]: the voxels of a block whose coordinate along `axis` is in lo..hi.
+// Four numbers side by side: one register of any 64-bit x86 or ARM.
+using Lanes = float __attribute__((vector_size(16)));
+using LaneMask = std::int32_t __attribute__((vector_size(16)));
+
+/// kLaneMasks[n]: lane k is chosen when bit k of n is set.
+constexpr std::array<std::array<std::int32_t, 4>, 16> make_lane_masks() {
+  std::array<std::array<std::int32_t, 4>, 16> masks{};
+  for (std::size_t n = 0; n < 16; ++n) {
+    for (std::size_t k = 0; k < 4; ++k) masks[n][k] = (n >> k & 1U) != 0 ? -1 : 0;
+  }
+  return masks;
+}
+
+alignas(16) constexpr std::array<std::array<std::int32_t, 4>, 16> kLaneMasks = make_lane_masks();
+
+Lanes all_lanes(float value) { return Lanes{value, value, value, value}; }
+Lanes load(const float (&values)[4]) { return std::bit_cast<Lanes>(values); }
+double sum(Lanes lanes) { return static_cast<double>((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])); }
+
+/// masks[axis][lo][hi]: the cells of a 4x4x4 cube whose coordinate along `axis` is in lo..hi.
 using AxisMasks = std::array<std::array<std::array<std::uint64_t, 4>, 4>, 3>;
 
 constexpr AxisMasks make_axis_masks() {
@@ -41,12 +60,25 @@ Eigen::Vector3i voxel_of(const Eigen::Vector3d& point, double voxel_size) {
   return cell_of<double>(point / voxel_size);
 }
 
-/// The mask along one axis of the voxels lo..hi (global indices) inside the block `block`.
-std::uint64_t axis_mask(std::size_t axis, int block, int lo, int hi) {
-  const int first = std::max(lo - (block << kEdgeBits), 0);
-  const int last = std::min(hi - (block << kEdgeBits), 3);
+/// The mask along one axis of the cells lo..hi (global indices) inside the cube `cube`.
+std::uint64_t axis_mask(std::size_t axis, int cube, int lo, int hi) {
+  const int first = std::max(lo - (cube << kEdgeBits), 0);
+  const int last = std::min(hi - (cube << kEdgeBits), 3);
   return kAxisMasks[axis][static_cast<std::size_t>(first)][static_cast<std::size_t>(last)];
 }
+
+/// The mask of the cells in the box lo..hi inside the cube at `cube`, which the box meets.
+std::uint64_t box_mask(const Eigen::Vector3i& cube, const Eigen::Vector3i& lo, const Eigen::Vector3i& hi) {
+  return axis_mask(0, cube.x(), lo.x(), hi.x()) & axis_mask(1, cube.y(), lo.y(), hi.y()) &
+         axis_mask(2, cube.z(), lo.z(), hi.z());
+}
+
+/// The cube that a cell lies in.
+Eigen::Vector3i cube_of(const Eigen::Vector3i& cell) {
+  return {cell.x() >> kEdgeBits, cell.y() >> kEdgeBits, cell.z() >> kEdgeBits};
+}
+
+int bit_of(const Eigen::Vector3i& inside) { return inside.x() + 4 * (inside.y() + 4 * inside.z()); }
 
 }  // namespace
 
@@ -60,8 +92,23 @@ LocalMap::LocalMap(const FrontendConfig& config)
   clear();
 }
 
+Eigen::Vector3f LocalMap::Block::point(int bit) const {
+  const Row& row = rows[bit / kEdge];
+  const int lane = bit % kEdge;
+  return {row.x[lane], row.y[lane], row.z[lane]};
+}
+
+void LocalMap::Block::set_point(int bit, const Eigen::Vector3f& local) {
+  Row& row = rows[bit / kEdge];
+  const int lane = bit % kEdge;
+  row.x[lane] = local.x();
+  row.y[lane] = local.y();
+  row.z[lane] = local.z();
+}
+
 void LocalMap::clear() {
   blocks_.clear();
+  regions_.clear();
   table_.assign(kFirstCapacity, kFree);
   size_ = 0;
   scans_ = 0;
@@ -70,7 +117,7 @@ void LocalMap::clear() {
 }
 
 std::size_t LocalMap::slot_of(const Eigen::Vector3i& coordinate) const {
-  // Three large primes spread neighbouring blocks; the high bits of the product are the well-mixed ones.
+  // Three large primes spread neighbouring regions; the high bits of the product are the well-mixed ones.
   const auto x = static_cast<std::uint64_t>(static_cast<std::int64_t>(coordinate.x()));
   const auto y = static_cast<std::uint64_t>(static_cast<std::int64_t>(coordinate.y()));
   const auto z = static_cast<std::uint64_t>(static_cast<std::int64_t>(coordinate.z()));
@@ -78,33 +125,58 @@ std::size_t LocalMap::slot_of(const Eigen::Vector3i& coordinate) const {
   return static_cast<std::size_t>((hash ^ (hash >> 29)) * 0xBF58476D1CE4E5B9ULL >> 20) & (table_.size() - 1);
 }
 
-const LocalMap::Block* LocalMap::find(const Eigen::Vector3i& coordinate) const {
+const LocalMap::Region* LocalMap::find_region(const Eigen::Vector3i& coordinate) const {
   for (std::size_t slot = slot_of(coordinate);; slot = (slot + 1) & (table_.size() - 1)) {
     const std::int32_t index = table_[slot];
     if (index == kFree) return nullptr;
-    const Block& block = blocks_[static_cast<std::size_t>(index)];
-    if (block.coordinate == coordinate) return &block;
+    const Region& region = regions_[static_cast<std::size_t>(index)];
+    if (region.coordinate == coordinate) return &region;
   }
 }
 
-LocalMap::Block& LocalMap::find_or_add(const Eigen::Vector3i& coordinate) {
+LocalMap::Region& LocalMap::find_or_add_region(const Eigen::Vector3i& coordinate) {
   std::size_t slot = slot_of(coordinate);
   for (; table_[slot] != kFree; slot = (slot + 1) & (table_.size() - 1)) {
-    Block& block = blocks_[static_cast<std::size_t>(table_[slot])];
-    if (block.coordinate == coordinate) return block;
+    Region& region = regions_[static_cast<std::size_t>(table_[slot])];
+    if (region.coordinate == coordinate) return region;
   }
-  table_[slot] = static_cast<std::int32_t>(blocks_.size());
-  blocks_.emplace_back().coordinate = coordinate;
-  if (2 * blocks_.size() > table_.size()) rebuild_table(2 * table_.size());
-  return blocks_.back();
+  table_[slot] = static_cast<std::int32_t>(regions_.size());
+  regions_.emplace_back().coordinate = coordinate;
+  if (2 * regions_.size() > table_.size()) rebuild_table(2 * table_.size());
+  return regions_.back();
+}
+
+LocalMap::Block& LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) {
+  const Eigen::Vector3i parent = cube_of(coordinate);
+  const int bit = bit_of(coordinate - kEdge * parent);
+  Region& region = find_or_add_region(parent);
+  if ((region.present >> bit & 1U) == 0) {
+    region.present |= std::uint64_t{1} << bit;
+    region.blocks[bit] = static_cast<std::int32_t>(blocks_.size());
+    blocks_.emplace_back().coordinate = coordinate;
+  }
+  return blocks_[static_cast<std::size_t>(region.blocks[bit])];
 }
 
 void LocalMap::rebuild_table(std::size_t capacity) {
   table_.assign(capacity, kFree);
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    std::size_t slot = slot_of(blocks_[i].coordinate);
+  for (std::size_t i = 0; i < regions_.size(); ++i) {
+    std::size_t slot = slot_of(regions_[i].coordinate);
     while (table_[slot] != kFree) slot = (slot + 1) & (table_.size() - 1);
     table_[slot] = static_cast<std::int32_t>(i);
+  }
+}
+
+/// The regions of blocks that have changed their places.
+void LocalMap::rebuild_regions() {
+  regions_.clear();
+  table_.assign(kFirstCapacity, kFree);
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const Eigen::Vector3i parent = cube_of(blocks_[i].coordinate);
+    const int bit = bit_of(blocks_[i].coordinate - kEdge * parent);
+    Region& region = find_or_add_region(parent);
+    region.present |= std::uint64_t{1} << bit;
+    region.blocks[bit] = static_cast<std::int32_t>(i);
   }
 }
 
@@ -119,32 +191,32 @@ void LocalMap::insert(std::span<const Eigen::Vector3f> points_body, const Pose& 
 
 void LocalMap::insert_point(const Eigen::Vector3d& point, bool confirmed) {
   const Eigen::Vector3i voxel = voxel_of(point, voxel_size_);
-  const Eigen::Vector3i coordinate(voxel.x() >> kEdgeBits, voxel.y() >> kEdgeBits, voxel.z() >> kEdgeBits);
+  const Eigen::Vector3i coordinate = cube_of(voxel);
   const Eigen::Vector3i inside = voxel - kEdge * coordinate;
-  const int bit = inside.x() + kEdge * (inside.y() + kEdge * inside.z());
+  const int bit = bit_of(inside);
   const std::uint64_t flag = std::uint64_t{1} << bit;
 
-  Block& block = find_or_add(coordinate);
+  Block& block = find_or_add_block(coordinate);
   const Eigen::Vector3f local = (point - kEdge * voxel_size_ * coordinate.cast<double>()).cast<float>();
-  Eigen::Map<Eigen::Vector3f> stored(block.local[bit]);
-  float& scan = block.scan[bit];
-  std::uint16_t& weight = block.weight[bit];
+  float& scan = block.rows[bit / kEdge].scan[bit % kEdge];
   const bool taken = (block.occupied & flag) != 0;
   const bool taken_confirmed = (block.confirmed & flag) != 0;
   if (taken_confirmed && !confirmed) return;
   const bool merges = taken && taken_confirmed == confirmed;
   if (merges && average_points_ > 1) {
+    std::uint16_t& weight = block.weight[bit];
     if (weight < average_points_) ++weight;
     const float share = 1.0F / static_cast<float>(weight);
-    stored += share * (local - stored);
+    const Eigen::Vector3f stored = block.point(bit);
+    block.set_point(bit, stored + share * (local - stored));
     scan += share * (static_cast<float>(scans_) - scan);
     return;
   }
-  if (merges && !nearer_to_centre(local, stored, inside)) return;
+  if (merges && !nearer_to_centre(local, block.point(bit), inside)) return;
   if (!taken) ++size_;
-  stored = local;
+  block.set_point(bit, local);
   scan = static_cast<float>(scans_);
-  weight = 1;
+  block.weight[bit] = 1;
   block.occupied |= flag;
   if (confirmed) block.confirmed |= flag;
 }
@@ -155,25 +227,32 @@ bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vecto
   return (point - centre).squaredNorm() < (stored - centre).squaredNorm();
 }
 
-void LocalMap::for_each_near(const Eigen::Vector3d& query, double radius, auto&& visit) const {
+void LocalMap::for_each_row(const Eigen::Vector3d& query, double radius, auto&& visit) const {
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius);
   const Eigen::Vector3i lo = voxel_of(query - reach, voxel_size_);
   const Eigen::Vector3i hi = voxel_of(query + reach, voxel_size_);
-  const auto radius2 = static_cast<float>(radius * radius);
+  const Eigen::Vector3i block_lo = cube_of(lo);
+  const Eigen::Vector3i block_hi = cube_of(hi);
+  const Eigen::Vector3i region_lo = cube_of(block_lo);
+  const Eigen::Vector3i region_hi = cube_of(block_hi);
   const double block_size = kEdge * voxel_size_;
-  for (int z = lo.z() >> kEdgeBits; z <= hi.z() >> kEdgeBits; ++z) {
-    const std::uint64_t mask_z = axis_mask(2, z, lo.z(), hi.z());
-    for (int y = lo.y() >> kEdgeBits; y <= hi.y() >> kEdgeBits; ++y) {
-      const std::uint64_t mask_yz = mask_z & axis_mask(1, y, lo.y(), hi.y());
-      for (int x = lo.x() >> kEdgeBits; x <= hi.x() >> kEdgeBits; ++x) {
-        const Block* block = find({x, y, z});
-        if (block == nullptr) continue;
-        const Eigen::Vector3f origin = (query - block_size * block->coordinate.cast<double>()).cast<float>();
-        for (std::uint64_t left = block->confirmed & mask_yz & axis_mask(0, x, lo.x(), hi.x()); left != 0;
-             left &= left - 1) {
-          const int bit = std::countr_zero(left);
-          const Eigen::Vector3f offset = Eigen::Map<const Eigen::Vector3f>(block->local[bit]) - origin;
-          if (offset.squaredNorm() <= radius2) visit(offset, *block, bit);
+  Eigen::Vector3i at;
+  for (at.z() = region_lo.z(); at.z() <= region_hi.z(); ++at.z()) {
+    for (at.y() = region_lo.y(); at.y() <= region_hi.y(); ++at.y()) {
+      for (at.x() = region_lo.x(); at.x() <= region_hi.x(); ++at.x()) {
+        const Region* region = find_region(at);
+        if (region == nullptr) continue;
+        for (std::uint64_t left = region->present & box_mask(at, block_lo, block_hi); left != 0; left &= left - 1) {
+          const Block& block = blocks_[static_cast<std::size_t>(region->blocks[std::countr_zero(left)])];
+          std::uint64_t voxels = block.confirmed & box_mask(block.coordinate, lo, hi);
+          if (voxels == 0) continue;
+          const Eigen::Vector3f local = (query - block_size * block.coordinate.cast<double>()).cast<float>();
+          while (voxels != 0) {
+            const int row = std::countr_zero(voxels) / kEdge;
+            const auto lanes = static_cast<std::uint32_t>(voxels >> (kEdge * row) & 0xFU);
+            visit(block.rows[row], lanes, local);
+            voxels &= ~(std::uint64_t{0xF} << (kEdge * row));
+          }
         }
       }
     }
@@ -181,17 +260,50 @@ void LocalMap::for_each_near(const Eigen::Vector3d& query, double radius, auto&&
 }
 
 NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius) const {
-  NeighbourMoments moments;
-  for_each_near(query, radius, [&](const Eigen::Vector3f& offset, const Block& block, int bit) {
-    moments.add(offset.cast<double>(), block.scan[bit]);
+  const Lanes radius2 = all_lanes(static_cast<float>(radius * radius));
+  LaneMask count{};
+  Lanes scan{};
+  Lanes x{}, y{}, z{};
+  Lanes xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
+  for_each_row(query, radius, [&](const Row& row, std::uint32_t lanes, const Eigen::Vector3f& local) {
+    Lanes dx = load(row.x) - all_lanes(local.x());
+    Lanes dy = load(row.y) - all_lanes(local.y());
+    Lanes dz = load(row.z) - all_lanes(local.z());
+    const LaneMask near = (dx * dx + dy * dy + dz * dz <= radius2) & std::bit_cast<LaneMask>(kLaneMasks[lanes]);
+    dx = near ? dx : Lanes{};
+    dy = near ? dy : Lanes{};
+    dz = near ? dz : Lanes{};
+    count -= near;
+    scan += near ? load(row.scan) : Lanes{};
+    x += dx;
+    y += dy;
+    z += dz;
+    xx += dx * dx;
+    xy += dx * dy;
+    xz += dx * dz;
+    yy += dy * dy;
+    yz += dy * dz;
+    zz += dz * dz;
   });
+  NeighbourMoments moments;
+  moments.count = count[0] + count[1] + count[2] + count[3];
+  moments.scan_sum = sum(scan);
+  moments.sum << sum(x), sum(y), sum(z);
+  moments.sum_outer << sum(xx), sum(xy), sum(xz), sum(xy), sum(yy), sum(yz), sum(xz), sum(yz), sum(zz);
   return moments;
 }
 
 std::optional<Eigen::Vector3d> LocalMap::nearest(const Eigen::Vector3d& query, double radius) const {
   std::optional<Eigen::Vector3f> best;
-  for_each_near(query, radius, [&](const Eigen::Vector3f& offset, const Block&, int) {
-    if (!best || offset.squaredNorm() < best->squaredNorm()) best = offset;
+  auto best2 = static_cast<float>(radius * radius);
+  for_each_row(query, radius, [&](const Row& row, std::uint32_t lanes, const Eigen::Vector3f& local) {
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const int lane = std::countr_zero(lanes);
+      const Eigen::Vector3f offset = Eigen::Vector3f(row.x[lane], row.y[lane], row.z[lane]) - local;
+      if (offset.squaredNorm() > best2) continue;
+      best = offset;
+      best2 = offset.squaredNorm();
+    }
   });
   if (!best) return std::nullopt;
   return query + best->cast<double>();
@@ -210,7 +322,7 @@ void LocalMap::slide(const Eigen::Vector3d& position) {
     const Eigen::Vector3d corner = kEdge * voxel_size_ * block.coordinate.cast<double>();
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
       const int bit = std::countr_zero(left);
-      const Eigen::Vector3d point = corner + Eigen::Map<const Eigen::Vector3f>(block.local[bit]).cast<double>();
+      const Eigen::Vector3d point = corner + block.point(bit).cast<double>();
       if (((point - position).cwiseAbs().array() <= window.array()).all()) continue;
       block.occupied &= ~(std::uint64_t{1} << bit);
       block.confirmed &= ~(std::uint64_t{1} << bit);
@@ -218,7 +330,7 @@ void LocalMap::slide(const Eigen::Vector3d& position) {
     }
   }
   std::erase_if(blocks_, [](const Block& block) { return block.occupied == 0; });
-  rebuild_table(std::max(kFirstCapacity, std::bit_ceil(2 * blocks_.size() + 1)));
+  rebuild_regions();
 }
 
 std::vector<Eigen::Vector3d> LocalMap::points() const {
@@ -227,7 +339,7 @@ std::vector<Eigen::Vector3d> LocalMap::points() const {
   for (const Block& block : blocks_) {
     const Eigen::Vector3d corner = kEdge * voxel_size_ * block.coordinate.cast<double>();
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
-      all.push_back(corner + Eigen::Map<const Eigen::Vector3f>(block.local[std::countr_zero(left)]).cast<double>());
+      all.push_back(corner + block.point(std::countr_zero(left)).cast<double>());
     }
   }
   return all;

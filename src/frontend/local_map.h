@@ -18,8 +18,9 @@ namespace ignis {
 /// metres. The point is the one nearest the voxel's centre or, with map_average_points above 1, the mean of all that
 /// fell into the voxel, the newest counting at least 1 / map_average_points: range noise averages out.
 ///
-/// Voxels live in blocks of 4x4x4 with one bit of occupancy each; blocks are found by open addressing. A neighbourhood
-/// is a few blocks and a bit mask, so its cost does not depend on the size of the map.
+/// Voxels live in blocks of 4x4x4, blocks in regions of 4x4x4, with one bit of occupancy each; regions are found by
+/// open addressing. A neighbourhood is one or two regions, bit masks, and the rows of four voxels that these leave, a
+/// cache line each: its cost does not depend on the size of the map, and empty space costs nothing.
 ///
 /// Points of scans that contradicted the map enter unconfirmed: they hold their voxel, but have no vote in plane fits
 /// until a scan that agreed puts a point of its own there.
@@ -54,24 +55,43 @@ class LocalMap {
 
  private:
   static constexpr int kEdge = 4;
-  static constexpr int kVoxels = kEdge * kEdge * kEdge;
+  static constexpr int kCells = kEdge * kEdge * kEdge;
+
+  /// Four voxels along x. All coordinates in one line of the cache, each ready for a vector register.
+  struct alignas(64) Row {
+    float x[kEdge] = {};  ///< [m] relative to the block's corner
+    float y[kEdge] = {};
+    float z[kEdge] = {};
+    float scan[kEdge] = {};  ///< mean number of the scans that the point comes from
+  };
 
   struct Block {
+    Row rows[kCells / kEdge];
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of block edges
     std::uint64_t occupied = 0;
     std::uint64_t confirmed = 0;
-    float local[kVoxels][3];        ///< [m] relative to the block's corner
-    float scan[kVoxels];            ///< mean number of the scans that the point comes from
-    std::uint16_t weight[kVoxels];  ///< points in the mean
+    std::uint16_t weight[kCells] = {};  ///< points in the mean
+
+    [[nodiscard]] Eigen::Vector3f point(int bit) const;  ///< [m] relative to the block's corner
+    void set_point(int bit, const Eigen::Vector3f& local);
   };
 
-  /// Calls visit(offset from the query [m], block, bit) for every confirmed point within a radius.
-  void for_each_near(const Eigen::Vector3d& query, double radius, auto&& visit) const;
-  [[nodiscard]] const Block* find(const Eigen::Vector3i& coordinate) const;
-  [[nodiscard]] Block& find_or_add(const Eigen::Vector3i& coordinate);
+  struct Region {
+    Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of region edges
+    std::uint64_t present = 0;                             ///< blocks that exist
+    std::int32_t blocks[kCells] = {};                      ///< index into blocks_
+  };
+
+  /// Calls visit(row, lanes, query relative to the block's corner [m]) for every row with confirmed points in the box
+  /// of half edge `radius` around the query; bit k of `lanes` says that voxel k of the row is one of them.
+  void for_each_row(const Eigen::Vector3d& query, double radius, auto&& visit) const;
+  [[nodiscard]] const Region* find_region(const Eigen::Vector3i& coordinate) const;
+  [[nodiscard]] Region& find_or_add_region(const Eigen::Vector3i& coordinate);
+  [[nodiscard]] Block& find_or_add_block(const Eigen::Vector3i& coordinate);
   void insert_point(const Eigen::Vector3d& point, bool confirmed);
   [[nodiscard]] bool nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored,
                                       const Eigen::Vector3i& inside) const;
+  void rebuild_regions();
   void rebuild_table(std::size_t capacity);
   [[nodiscard]] std::size_t slot_of(const Eigen::Vector3i& coordinate) const;
 
@@ -81,7 +101,8 @@ class LocalMap {
   double window_y_;
   int average_points_;
   std::vector<Block> blocks_;
-  std::vector<std::int32_t> table_;  ///< index into blocks_, -1 when free; power of two, at most half full
+  std::vector<Region> regions_;
+  std::vector<std::int32_t> table_;  ///< index into regions_, -1 when free; power of two, at most half full
   int size_ = 0;
   int scans_ = 0;
   std::int64_t inserted_points_ = 0;

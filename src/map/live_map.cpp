@@ -33,7 +33,7 @@ LiveMap::LiveMap(const MapConfig& config)
 }
 
 ThreeLevelMap::CloudLookup LiveMap::lookup() const {
-  return [this](std::int32_t id) { return clouds_.view(id); };
+  return [this](std::int32_t id) { return drawing_ ? clouds_.view(id) : StoredCloud{}; };
 }
 
 InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
@@ -73,15 +73,16 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
 InsertCounts LiveMap::show(const KeyframeClouds::Kept& kept) {
   if (!map_.contains(kept.id)) map_.add_cloud(kept.id, newest_pose(kept.id));
   map_.set_open_cloud(clouds_.open_id());
+  if (rebuilding_) arrivals_.push_back({kept.id, {kept.points.begin(), kept.points.end()}});
+  if (!drawing_) return {};
   const InsertCounts counts = map_.insert(kept.id, kept.points);
   map_.stay_within_bound(lookup());
-  if (rebuilding_) arrivals_.push_back({kept.id, {kept.points.begin(), kept.points.end()}});
   return counts;
 }
 
 /// Whoever has just been closed says what it found free.
 void LiveMap::cast_votes() {
-  if (!config_.carve_free_space) return;
+  if (!config_.carve_free_space || !drawing_) return;
   for (const std::int32_t id : map_.cloud_ids()) {
     if (id != clouds_.open_id() && !map_.has_voted(id)) map_.cast_votes(id, lookup());
   }
@@ -159,6 +160,7 @@ void LiveMap::finish_rebuild(ThreeLevelMap map) {
   map.continue_versions(map_);
   map_ = std::move(map);
   rebuilding_ = false;
+  drawing_ = true;
   for (const Arrival& arrival : std::exchange(arrivals_, {})) {
     if (!map_.contains(arrival.id)) map_.add_cloud(arrival.id, newest_pose(arrival.id));
     map_.insert(arrival.id, arrival.points);

@@ -55,6 +55,9 @@ class LiveMap {
   LiveMap(const LiveMap&) = delete;
   LiveMap& operator=(const LiveMap&) = delete;
 
+  /// Draws nothing from here until the next rebuild, which then shows everything: for whoever looks at the end only.
+  void draw_at_rebuild() { drawing_ = false; }
+
   /// A scan in the body frame. Returns what became of its points.
   InsertCounts insert_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body);
 
@@ -133,6 +136,7 @@ class LiveMap {
   std::int32_t newest_revision_ = 0;
   std::int32_t drawn_revision_ = 0;
   std::int32_t rebuilt_revision_ = 0;  // that the rebuild under way will show
+  bool drawing_ = true;
   bool needs_rebuild_ = false;
   bool rebuilding_ = false;
   std::vector<Arrival> arrivals_;  // since the rebuild under way began
