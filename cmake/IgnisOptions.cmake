@@ -43,6 +43,11 @@ function(ignis_add_library name)
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} ignis_warnings)
 endfunction()
 
+# ignis_optimise_loops(NAME): for libraries in which a program spends its time.
+function(ignis_optimise_loops name)
+  target_compile_options(${name} PRIVATE $<$<CONFIG:RelWithDebInfo>:-O3>)
+endfunction()
+
 # ignis_add_test(NAME SOURCES... LINK targets...): a GoogleTest program; each test becomes a ctest entry.
 function(ignis_add_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
