@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
+#include "frontend/scatter_axes.h"
 
 namespace ignis {
 
@@ -15,10 +15,9 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   const double inverse_count = 1.0 / moments.count;
   fit.offset = moments.sum * inverse_count;
   const Eigen::Matrix3d scatter = moments.sum_outer * inverse_count - fit.offset * fit.offset.transpose();
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(scatter);
-  const Eigen::Vector3d lambda = solver.eigenvalues().cwiseMax(0.0);
-  fit.normal = solver.eigenvectors().col(0);
+  const ScatterAxes axes = scatter_axes(scatter);
+  const Eigen::Vector3d lambda = axes.values.cwiseMax(0.0);
+  fit.normal = axes.vectors.col(0);
   fit.mean_scan = moments.scan_sum * inverse_count;
 
   const double tangential = (fit.offset - fit.normal * fit.normal.dot(fit.offset)).norm();
@@ -34,8 +33,8 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
     fit.verdict = PlaneVerdict::kPlane;
     // Three degrees of freedom went into the plane itself.
     const double across = lambda[0] / std::max(moments.count - 3, 1);
-    fit.normal_sigma.col(0) = std::sqrt(across / lambda[1]) * solver.eigenvectors().col(1);
-    fit.normal_sigma.col(1) = std::sqrt(across / lambda[2]) * solver.eigenvectors().col(2);
+    fit.normal_sigma.col(0) = std::sqrt(across / lambda[1]) * axes.vectors.col(1);
+    fit.normal_sigma.col(1) = std::sqrt(across / lambda[2]) * axes.vectors.col(2);
   }
   return fit;
 }
