@@ -10,9 +10,9 @@ namespace ignis {
 namespace {
 
 constexpr int kMaxSteps = 40;
-constexpr double kConverged = 1e-15;  // of the trace
-constexpr double kParallel = 1e-20;   // squared sine between rows that say nothing about their normal
-constexpr double kNothing = 1e-300;   // a trace that is none
+constexpr double kConverged = 1e-8;  // of the trace: the step after it would be of the order of its square
+constexpr double kParallel = 1e-20;  // squared sine between rows that say nothing about their normal
+constexpr double kNothing = 1e-300;  // a trace that is none
 
 /// Smallest eigenvalue of a matrix of trace 1.
 double smallest_root(const Eigen::Matrix3d& A) {

@@ -166,6 +166,24 @@ def test_chosen_loop_shows_its_figures_and_clouds(drive: LiveDrive) -> None:
     assert view.text("loop-reason")
 
 
+def test_a_click_on_a_loops_knob_chooses_it(drive: LiveDrive) -> None:
+    view = drive.view
+    view.page.keyboard.press("Escape")
+    width, height = 960, 600
+
+    def free(knob: dict[str, float]) -> bool:
+        """On the canvas, under no panel, and not so near another knob that a click may mean that one."""
+        near = [k for k in view.knobs() if np.hypot(k["x"] - knob["x"], k["y"] - knob["y"]) < 16]
+        inside = 0 < knob["x"] < width and 0 < knob["y"] < height
+        script = "([x, y]) => document.elementFromPoint(x, y)?.id"
+        return len(near) == 1 and inside and view.page.evaluate(script, [knob["x"], knob["y"]]) == "map"
+
+    knob = view.wait(20, "a knob in sight", lambda: next(filter(free, view.knobs()), None))
+    view.page.mouse.click(knob["x"], knob["y"])
+    title = f"{knob['from']:.0f} → {knob['to']:.0f}"
+    view.wait(5, "the loop that was clicked", lambda: view.text("loop-title") == title)
+
+
 def test_withdrawing_asks_first_and_reaches_the_back_end(drive: LiveDrive) -> None:
     view = drive.view
     title = view.text("loop-title").split(" → ")
@@ -179,6 +197,16 @@ def test_withdrawing_asks_first_and_reaches_the_back_end(drive: LiveDrive) -> No
     command = drive.listener.commands[0]
     assert [command.command, command.from_id, command.to_id] == [command.WITHDRAW_LOOP, int(title[0]), int(title[1])]
     view.wait(10, "the back end's answer", lambda: view.text("loop-stage") == "withdrawn")
+
+
+def test_a_veto_reaches_the_back_end(drive: LiveDrive) -> None:
+    view = drive.view
+    title = view.text("loop-title").split(" → ")
+    view.page.get_by_test_id("veto").click()
+    assert "never" in view.text("confirm")
+    view.page.get_by_test_id("confirm-yes").click()
+    command = view.wait(10, "the command", lambda: drive.listener.commands[1:])[0]
+    assert [command.command, command.from_id, command.to_id] == [command.VETO_LOOP, int(title[0]), int(title[1])]
 
 
 def test_an_event_leads_back_to_where_it_happened(drive: LiveDrive) -> None:

@@ -58,6 +58,10 @@ class ViewPage:
         """Counts and checksum of the voxels in the buffers of the graphics card."""
         return self.page.evaluate("() => window.__ignis.audit()")
 
+    def knobs(self) -> list[dict[str, float]]:
+        """Where loops can be clicked: from, to, x, y."""
+        return self.page.evaluate("() => window.__ignis.knobs()")
+
     def wait(self, seconds: float, what: str, holds: Callable[[], Any]) -> Any:
         """The first true value of `holds`. The page's own waiting functions need eval, which its policy forbids."""
         deadline = time.monotonic() + seconds

@@ -32,7 +32,7 @@ const status = new StatusDisplay();
 const timeline = new Timeline();
 const loops = new LoopPanel(send);
 const controls = new ControlsPanel(settings);
-const hook = makeHook(() => view.voxels.audit());
+const hook = makeHook({ audit: () => view.voxels.audit(), knobs: () => view.knobs() });
 const reporter = new ViewReporter((radius) => send({ view: radius }));
 const switchTheme = watchTheme(settings, (theme) => view.setTheme(theme));
 let hello: Hello | null = null;

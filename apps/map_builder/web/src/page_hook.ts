@@ -34,6 +34,8 @@ export interface PageHook {
   cameraTarget: [number, number, number];
   /** Counts and checksum of what lies on the graphics card. */
   audit: () => { counts: PerLevel; checksum: string };
+  /** Where each loop can be clicked, CSS pixels in the window. */
+  knobs: () => { from: number; to: number; x: number; y: number }[];
 }
 
 declare global {
@@ -44,12 +46,12 @@ declare global {
 
 export const KEPT_APPLIED = 2000;
 
-export function makeHook(audit: PageHook["audit"]): PageHook {
+export function makeHook({ audit, knobs }: Pick<PageHook, "audit" | "knobs">): PageHook {
   const hook: PageHook = {
     connected: false, connections: 0, sequence: 0, revision: 0, checksum: "", counts: [0, 0, 0], hud: null,
     snapshots: 0, deltas: 0, resyncs: 0, errors: 0, bytes: 0, viewRadius: 0, servedRadius: 0, lastFrameAt: 0, drawn: 0,
     applied: [], paths: { eskf: 0, smoothed: 0 }, keyframes: 0, loops: [], loopClouds: [0, 0], events: 0,
-    vehicle: [0, 0, 0], cameraTarget: [0, 0, 0], audit,
+    vehicle: [0, 0, 0], cameraTarget: [0, 0, 0], audit, knobs,
   };
   window.__ignis = hook;
   return hook;

@@ -89,15 +89,23 @@ export class LoopArcs {
     this.halo.set(halo.flat(), [[1, 1, 1]]);
   }
 
+  /** Where the knobs in front of the camera are drawn, CSS pixels from the upper left corner of a canvas of that size. */
+  knobsOn(width: number, height: number, camera: PerspectiveCamera): { arc: Arc; x: number; y: number }[] {
+    const drawn = [];
+    for (const arc of this.arcs) {
+      const top = new ThreeVector(...arcPoint(arc, 0.5)).project(camera);
+      if (top.z <= 1) drawn.push({ arc, x: ((top.x + 1) / 2) * width, y: ((1 - top.y) / 2) * height });
+    }
+    return drawn;
+  }
+
   /** The arc whose knob is drawn nearest to the point, at most `reach` CSS pixels away. */
   pick(x: number, y: number, width: number, height: number, camera: PerspectiveCamera, reach: number): Arc | null {
     let best: Arc | null = null;
     let nearest = reach;
-    for (const arc of this.arcs) {
-      const top = new ThreeVector(...arcPoint(arc, 0.5)).project(camera);
-      if (top.z > 1) continue;
-      const distance = Math.hypot(((top.x + 1) / 2) * width - x, ((1 - top.y) / 2) * height - y);
-      if (distance < nearest) [best, nearest] = [arc, distance];
+    for (const knob of this.knobsOn(width, height, camera)) {
+      const distance = Math.hypot(knob.x - x, knob.y - y);
+      if (distance < nearest) [best, nearest] = [knob.arc, distance];
     }
     return best;
   }

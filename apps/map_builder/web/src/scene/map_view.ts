@@ -202,6 +202,14 @@ export class MapView {
     this.dirty = true;
   }
 
+  /** Where each loop can be clicked in the window. */
+  knobs(): { from: number; to: number; x: number; y: number }[] {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    return this.arcs
+      .knobsOn(width, height, this.rig.camera)
+      .map(({ arc, x, y }) => ({ from: arc.fromId, to: arc.toId, x: x + left, y: y + top }));
+  }
+
   /** A click or tap that is no drag picks a loop. */
   private watchPicks(): void {
     let pressed: { x: number; y: number } | null = null;
