@@ -176,6 +176,44 @@ void update_step(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations());
 }
 
+// How the two dearest kernels grow, for bench/scaling.py: a match with the points that go in, as far as they go in at
+// all (max_scan_points), and a search with the size of the map.
+void match_points(benchmark::State& state) {
+  const RecordedDrive& drive = recorded_drive("spinning128");
+  const LocalMap map = map_before_last(drive);
+  const std::vector<CloudPoint> cloud = last_cloud(drive);
+  const auto wanted = static_cast<std::size_t>(state.range(0));
+  std::vector<Eigen::Vector3f> points;
+  for (std::size_t i = 0; i < wanted; ++i) points.push_back(cloud[i * cloud.size() / wanted].position);
+  const FilterState predicted = prediction(drive);
+  ScanMatcher matcher(drive.config);
+  for (auto _ : state) benchmark::DoNotOptimize(matcher.match(predicted, predicted.nominal.T_odom_body, points, map));
+  count(state, points);
+}
+
+void gather_in_floor(benchmark::State& state) {
+  FrontendConfig config;
+  config.map_window_m = 200.0;
+  LocalMap map(config);
+  const auto edge = static_cast<int>(state.range(0));
+  std::vector<Eigen::Vector3f> points;
+  for (int i = -edge / 2; i < edge / 2; ++i) {
+    for (int j = -edge / 2; j < edge / 2; ++j) {
+      const Eigen::Vector2d at = config.voxel_size_m * Eigen::Vector2d(i + 0.5, j + 0.5);
+      points.emplace_back(static_cast<float>(at.x()), 0.1F, static_cast<float>(at.y()));
+    }
+  }
+  map.insert(points, {}, true);
+  // Far apart from one to the next, as the points of a scan are.
+  std::size_t at = 0;
+  for (auto _ : state) {
+    at = (at + 7919) % points.size();
+    benchmark::DoNotOptimize(map.gather(points[at].cast<double>(), 0.5));
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.counters["voxels"] = map.size();
+}
+
 #define IGNIS_BOTH_SENSORS(kernel)                                                 \
   BENCHMARK_CAPTURE(kernel, l1, std::string("l1"))->Unit(benchmark::kMicrosecond); \
   BENCHMARK_CAPTURE(kernel, spinning128, std::string("spinning128"))->Unit(benchmark::kMicrosecond)
@@ -189,6 +227,8 @@ IGNIS_BOTH_SENSORS(fit_planes);
 IGNIS_BOTH_SENSORS(match_scan);
 BENCHMARK(predict_step);
 BENCHMARK(update_step);
+BENCHMARK(match_points)->RangeMultiplier(2)->Range(250, 8000)->Unit(benchmark::kMicrosecond);
+BENCHMARK(gather_in_floor)->RangeMultiplier(2)->Range(64, 1024);
 
 }  // namespace
 }  // namespace ignis::bench

@@ -200,7 +200,7 @@ void encode_a_snapshot(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(encode_snapshot(picture));
   state.counters["bytes"] = static_cast<double>(snapshot_bytes(picture));
 }
-BENCHMARK(encode_a_snapshot)->Arg(25)->Arg(100)->Unit(benchmark::kMillisecond);
+BENCHMARK(encode_a_snapshot)->Arg(10)->Arg(25)->Arg(50)->Arg(100)->Unit(benchmark::kMillisecond);
 
 // The windows move on by half a metre through a known place: what enters is filled from the stored clouds.
 void slide_through_a_known_place(benchmark::State& state) {
@@ -246,7 +246,7 @@ void rebuild_all(benchmark::State& state) {
   state.counters["voxels"] = static_cast<double>(map->voxels().size());
   state.counters["bytes"] = static_cast<double>(map->voxels().bytes() + map->clouds().bytes());
 }
-BENCHMARK(rebuild_all)->Arg(500)->Unit(benchmark::kMillisecond);
+BENCHMARK(rebuild_all)->Arg(125)->Arg(250)->Arg(500)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace ignis::bench

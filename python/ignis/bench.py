@@ -103,7 +103,7 @@ def bench(arguments: argparse.Namespace) -> int:
     requirements = _CHECKOUT / "packaging" / "peer-requirements.txt"
     cache = Path(os.environ.get("IGNIS_CACHE", Path.home() / ".cache" / "ignis"))
     python = peers_python(requirements, cache) if arguments.peers else None
-    versions = ", ".join(line for line in requirements.read_text().splitlines() if line and not line.startswith("#"))
+    versions = ", ".join(line for line in requirements.read_text().splitlines() if "==" in line)
     arguments.out.mkdir(parents=True, exist_ok=True)
     outcomes: list[Outcome] = []
     runs = [(path, seed) for path in _scene_files(arguments) for seed in _seeds(arguments)]

@@ -18,7 +18,7 @@ from ignis.errors import InputError
 from ignis.poses import Trajectory, read_tum
 
 OURS = ("ours: ESKF", "ours: smoothed")
-PEERS = ("rko-lio", "kiss-icp", "kiss-slam", "genz-icp")
+PEERS = ("rko-lio", "kiss-icp", "kiss-slam", "genz-icp", "small-gicp")
 CPU_LIMIT_S = 3600
 _RUNNER = Path(__file__).with_name("peer_runner.py")
 
