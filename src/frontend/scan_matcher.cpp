@@ -103,19 +103,22 @@ ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
   const Pose& pose = predicted.nominal.T_odom_body;
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   const Matrix6d P = predicted.covariance.topLeftCorner<6, 6>();
-  const auto count = static_cast<double>(constraints_.size());
   Assessment assessment;
   for (const Constraint& constraint : constraints_) {
     const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
-    const double z = constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance;
-    assessment.mean_innovation += std::abs(z) / count;
-    assessment.observability += constraint.normal.cwiseAbs2() / count;
-    assessment.sensitivity += h * h.transpose() / count;
+    assessment.mean_innovation += std::abs(residual(R, pose.translation, constraint));
+    assessment.observability += constraint.normal.cwiseAbs2();
+    assessment.sensitivity += h * h.transpose();
     for (int k = 0; k < 2; ++k) {
       const Vector6d error = jacobian(R, constraint.point_body, constraint.normal_sigma.col(k));
-      assessment.normal_noise += error * error.transpose() / count;
+      assessment.normal_noise += error * error.transpose();
     }
   }
+  const double share = 1.0 / static_cast<double>(constraints_.size());
+  assessment.mean_innovation *= share;
+  assessment.observability *= share;
+  assessment.sensitivity *= share;
+  assessment.normal_noise *= share;
   // trace(P S) is the mean of h^T P h over the points.
   assessment.expected_innovation = std::sqrt(std::max((P * assessment.sensitivity).trace(), 0.0));
   weigh(assessment.observability);
@@ -141,6 +144,10 @@ void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
   }
 }
 
+double ScanMatcher::residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Constraint& constraint) {
+  return constraint.normal.dot(R * constraint.point_body + t) - constraint.plane_distance;
+}
+
 double ScanMatcher::inflation() const {
   return degeneracy_.degenerate_directions > 0 ? config_.blind_residual_inflation : config_.residual_inflation;
 }
@@ -148,11 +155,13 @@ double ScanMatcher::inflation() const {
 double ScanMatcher::point_variance(const Pose& pose) const {
   if (!config_.adapt_measurement_noise) return config_.measurement_noise;
   // Posterior mean of a variance whose prior is the configured value, worth `noise_prior_points` observations.
-  double sum = config_.noise_prior_points * config_.measurement_noise;
+  const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
+  double squares = 0.0;
   for (const Constraint& constraint : constraints_) {
-    const double z = constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance;
-    sum += inflation() * z * z;
+    const double z = residual(R, pose.translation, constraint);
+    squares += z * z;
   }
+  const double sum = config_.noise_prior_points * config_.measurement_noise + inflation() * squares;
   const double variance = sum / (config_.noise_prior_points + static_cast<double>(constraints_.size()));
   return std::min(variance, config_.measurement_noise);
 }
@@ -164,7 +173,7 @@ PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_c
   PoseInformation sum;
   for (const Constraint& constraint : constraints_) {
     const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
-    const double z = constraint.normal.dot(R * constraint.point_body + pose.translation) - constraint.plane_distance;
+    const double z = residual(R, pose.translation, constraint);
     const double variance = base_variance / constraint.weight;
     if (z * z > gate2 * (h.dot(pose_covariance * h) + variance)) continue;
     sum.add(h, z, variance);
@@ -243,10 +252,9 @@ std::optional<PoseInformation> ScanMatcher::use_doubtful(FilterState& iterate) c
 }
 
 double ScanMatcher::mean_residual(const Pose& pose) const {
+  const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   double sum = 0.0;
-  for (const Constraint& constraint : constraints_) {
-    sum += std::abs(constraint.normal.dot(pose * constraint.point_body) - constraint.plane_distance);
-  }
+  for (const Constraint& constraint : constraints_) sum += std::abs(residual(R, pose.translation, constraint));
   return constraints_.empty() ? 0.0 : sum / static_cast<double>(constraints_.size());
 }
 

@@ -66,6 +66,9 @@ class ScanMatcher {
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);
+  /// Distance of a point from its plane [m] at the pose (R, t).
+  [[nodiscard]] static double residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t,
+                                       const Constraint& constraint);
   [[nodiscard]] double inflation() const;
   [[nodiscard]] double point_variance(const Pose& pose) const;
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance) const;

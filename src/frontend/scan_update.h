@@ -13,8 +13,9 @@ struct PoseInformation {
   int count = 0;
 
   void add(const Vector6d& h, double residual, double variance) {
-    information += h * (h.transpose() / variance);
-    gradient += h * (residual / variance);
+    const Vector6d weighted = h * (1.0 / variance);
+    information += weighted * h.transpose();
+    gradient += weighted * residual;
     ++count;
   }
   /// Keeps the part that lies in the image of the projector (see degeneracy.h).
