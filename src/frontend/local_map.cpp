@@ -218,8 +218,10 @@ void LocalMap::slide(const Eigen::Vector3d& position) {
     }
   }
   std::erase_if(blocks_, [](const Block& block) { return block.occupied == 0; });
-  rebuild_table(std::max(kFirstCapacity, std::bit_ceil(2 * blocks_.size() + 1)));
+  fit_table();
 }
+
+void LocalMap::fit_table() { rebuild_table(std::max(kFirstCapacity, std::bit_ceil(2 * blocks_.size() + 1))); }
 
 std::vector<Eigen::Vector3d> LocalMap::points() const {
   std::vector<Eigen::Vector3d> all;

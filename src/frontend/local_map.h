@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -8,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "common/byte_codec.h"
 #include "common/pose.h"
 #include "frontend/frontend_config.h"
 #include "frontend/plane_fit.h"
@@ -73,6 +75,7 @@ class LocalMap {
   [[nodiscard]] bool nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored,
                                       const Eigen::Vector3i& inside) const;
   void rebuild_table(std::size_t capacity);
+  void fit_table();
   [[nodiscard]] std::size_t slot_of(const Eigen::Vector3i& coordinate) const;
 
   double voxel_size_;
@@ -87,6 +90,29 @@ class LocalMap {
   std::int64_t inserted_points_ = 0;
   bool has_slid_ = false;
   Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();
+
+  /// Taken voxels alone.
+  friend void transfer(auto& io, FieldsOf<Block> auto& block) {
+    io.matrix(block.coordinate);
+    io.number(block.occupied);
+    io.number(block.confirmed);
+    for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
+      const int bit = std::countr_zero(left);
+      for (auto& coordinate : block.local[bit]) io.number(coordinate);
+      io.number(block.scan[bit]);
+      io.number(block.weight[bit]);
+    }
+  }
+
+  friend void transfer(auto& io, FieldsOf<LocalMap> auto& map) {
+    io.list(map.blocks_);
+    io.number(map.size_);
+    io.number(map.scans_);
+    io.number(map.inserted_points_);
+    io.number(map.has_slid_);
+    io.matrix(map.last_slide_);
+    if constexpr (requires { map.fit_table(); }) map.fit_table();
+  }
 };
 
 }  // namespace ignis
