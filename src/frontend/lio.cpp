@@ -180,6 +180,7 @@ void Lio::start(const FilterState& first) {
   running_ = true;
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
+  if (!start_note_.empty()) trust_.note_uncertain_start();
   if (!velocity_known_) return;
   // The first pose defines the frame of the map; that this frame may not be level is drift, not an error of the pose in
   // it. Gravity's direction in that frame is then what the accelerometer bias has to account for.

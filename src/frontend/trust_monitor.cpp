@@ -12,6 +12,7 @@ constexpr int kScansUntilDegraded = 5;     // without a correction
 constexpr double kSecondsUntilLost = 2.0;  // without a correction
 constexpr double kSilentImuSeconds = 0.1;  // of scan time
 constexpr int kScansToConfirm = 10;        // applied ones, after silence or a loss
+constexpr int kScansToConfirmStart = 60;   // the second opinion needs 2 s, and something to go on
 constexpr double kOpinionSeconds = 2.0;    // over which scans and IMU are compared
 constexpr double kMaxDisagreement = 8.0;   // sigma
 
@@ -49,6 +50,12 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   // What closed the gap says nothing about how scans and IMU agree.
   if (resumed_) corrections_.clear();
   resumed_ = false;
+  uncertain_start_ = false;
+}
+
+void TrustMonitor::note_uncertain_start() {
+  uncertain_start_ = true;
+  scans_to_confirm_ = kScansToConfirmStart;
 }
 
 void TrustMonitor::note_resumption() {
@@ -106,6 +113,9 @@ std::string TrustMonitor::reason() const {
   if (scans_since_applied_ >= kScansUntilDegraded) return std::format("no scan applied: {}", last_reason_);
   if (seconds_without_imu() > kSilentImuSeconds) {
     return std::format("no IMU data for {:.1f} s, going on with scans alone", seconds_without_imu());
+  }
+  if (disagreement() <= kMaxDisagreement && uncertain_start_) {
+    return std::format("new session after a restart, {} applied scans to go", scans_to_confirm_);
   }
   if (resumed_) return std::format("resumed after a restart, {} applied scans to go", scans_to_confirm_);
   if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);

@@ -47,6 +47,8 @@ class TrustMonitor {
   /// The filter goes on from a checkpoint. Until scans have confirmed it, the pose is dead reckoning over a gap.
   void note_resumption();
   [[nodiscard]] bool awaits_confirmation() const { return resumed_; }
+  /// A start in the middle of a drive, perhaps: to the IMU constant velocity looks like rest, and only scans tell.
+  void note_uncertain_start();
 
   [[nodiscard]] Trust trust() const;
   /// Why the trust is not kOk; what happened last when it is.
@@ -72,6 +74,7 @@ class TrustMonitor {
   int scans_to_confirm_ = 0;  ///< that have to be applied before the trust comes back
   bool lost_ = false;
   bool resumed_ = false;  ///< from a checkpoint, and not yet confirmed
+  bool uncertain_start_ = false;
   int losses_ = 0;
   double position_sigma_ = 0.0;
   double accel_bias_sigma_ = 0.0;
@@ -90,6 +93,7 @@ class TrustMonitor {
     io.number(monitor.scans_since_applied_);
     io.number(monitor.scans_to_confirm_);
     io.number(monitor.lost_);
+    io.number(monitor.uncertain_start_);
     io.number(monitor.losses_);
     io.number(monitor.position_sigma_);
     io.number(monitor.accel_bias_sigma_);

@@ -242,6 +242,21 @@ TEST(Checkpoint, AnotherConfigurationVersionOrAnOffSwitchBeginsANewSessionWithAR
   EXPECT_TRUE(none.session() == 0 && none.start_note().empty());
 }
 
+TEST(Checkpoint, ANewSessionThatBeginsInMotionIsNotOkWhileItsVelocityIsWrong) {
+  const Drive cruise = test::simulate(test::furnished_hall(), test::straight_drive(0.0, 1.5), 7.0, Sensors{}, 13);
+  Lio lio(test::tuned_config(), 1, "new session: the checkpoint is not used");
+  const Stretch stretch = feed(lio, cruise, 0.0, 6.9);
+  bool started_at_rest = false;
+  for (std::size_t i = 0; i < stretch.scans.size(); ++i) {
+    const ScanResult& scan = stretch.scans[i];
+    if (!scan.has_state) continue;
+    const bool is_wrong = std::abs(scan.state.v_odom.norm() - 1.5) > 0.5;
+    started_at_rest = started_at_rest || is_wrong;
+    EXPECT_FALSE(is_wrong && stretch.trust[i].second == Trust::kOk) << test::drive_seconds(cruise, scan.stats.utime);
+  }
+  EXPECT_TRUE(started_at_rest) << "else this test shows nothing";
+}
+
 /// A front end with a coarse map, whose checkpoint is small.
 std::vector<std::byte> small_checkpoint(FrontendConfig& config) {
   config = test::tuned_config();
