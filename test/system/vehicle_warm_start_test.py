@@ -29,7 +29,13 @@ OK, DEGRADED = 0, 1
 
 # Down the long aisle and back, in two ways.
 DRIVES = {
-    "walking pace, 1.5 m/s": {"speed_m_s": 1.5, "acceleration_m_s2": 0.8, "kills": 4, "first": 8.0, "every": (5.0, 8.0)},
+    "walking pace, 1.5 m/s": {
+        "speed_m_s": 1.5,
+        "acceleration_m_s2": 0.8,
+        "kills": 4,
+        "first": 8.0,
+        "every": (5.0, 8.0),
+    },
     "fast, 5 m/s": {"speed_m_s": 5.0, "acceleration_m_s2": 2.0, "kills": 3, "first": 6.5, "every": (2.2, 2.8)},
 }
 
@@ -147,7 +153,9 @@ class Vehicle:
 
 
 @pytest.fixture(scope="module", params=DRIVES.items(), ids=lambda item: item[0])
-def driven(private_network, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watch]:
+def driven(
+    private_network, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Watch]:
     """A drive with kills at seeded instants."""
     terms = request.param[1]
     folder = tmp_path_factory.mktemp("warm_start")
@@ -165,7 +173,9 @@ def driven(private_network, request: pytest.FixtureRequest, tmp_path_factory: py
         vehicle.drive_until(began, at + 4.0)
         for kill in vehicle.watch.kills:
             vehicle.watch.judge(kill)
-            print(f"good after {kill.first_good_s:.2f} s, trusted after {kill.trusted_s:.2f} s, step {kill.step_m:.3f} m")
+            print(
+                f"good after {kill.first_good_s:.2f} s, trusted after {kill.trusted_s:.2f} s, step {kill.step_m:.3f} m"
+            )
         yield vehicle.watch
 
 
