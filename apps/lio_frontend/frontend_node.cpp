@@ -16,7 +16,7 @@ namespace channels = runtime::channels;
 
 constexpr int kPollMs = 100;
 constexpr int kKeyframeRequestQueue = 100;
-constexpr Utime kCheckpointPeriod = 200'000;  // [us]
+constexpr Utime kCheckpointPeriod = 400'000;  // [us]
 
 /// Calls `work` and returns its result with the wall time it took [ms].
 template <class Work>

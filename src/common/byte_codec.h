@@ -32,9 +32,7 @@ class ByteWriter {
  public:
   explicit ByteWriter(std::vector<std::byte>& bytes) : bytes_(bytes) {}
 
-  void number(const Number auto& value) {
-    raw(&value, sizeof value);
-  }
+  void number(const Number auto& value) { raw(&value, sizeof value); }
   void text(const std::string& value) {
     number(static_cast<std::uint32_t>(value.size()));
     raw(value.data(), value.size());

@@ -38,7 +38,8 @@ std::vector<std::byte> encode_record(std::span<const std::byte> payload) {
 
 RecordAt record_at(std::span<const std::byte> bytes, std::size_t offset) {
   const std::span<const std::byte> rest = bytes.subspan(offset);
-  if (rest.size() < kRecordFrameBytes) return {{}, std::format("{} of {} bytes of a frame", rest.size(), kRecordFrameBytes), true};
+  if (rest.size() < kRecordFrameBytes)
+    return {{}, std::format("{} of {} bytes of a frame", rest.size(), kRecordFrameBytes), true};
   Frame frame;
   ByteReader reader(rest);
   reader.number(frame.size);

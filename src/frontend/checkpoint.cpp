@@ -14,6 +14,9 @@ namespace {
 
 constexpr std::array<char, 8> kMagic{'I', 'G', 'N', 'I', 'S', 'F', 'E', 'C'};
 
+constexpr std::size_t kBytesBesideMap = 1U << 18U;  // about
+constexpr std::size_t kBytesPerMapPoint = 24;       // about: its block has a share in it
+
 struct Head {
   std::array<char, 8> magic = kMagic;
   std::uint32_t version = kCheckpointVersion;
@@ -28,8 +31,9 @@ void transfer(auto& io, FieldsOf<Head> auto& head) {
   io.number(head.session);
 }
 
-std::vector<std::byte> record_of(const auto& value) {
+std::vector<std::byte> record_of(const auto& value, std::size_t expected_bytes = 0) {
   std::vector<std::byte> payload;
+  payload.reserve(expected_bytes);
   ByteWriter writer(payload);
   transfer(writer, value);
   return encode_record(payload);
@@ -59,7 +63,8 @@ std::vector<std::byte> encode_checkpoint(const Lio& lio, const std::string& conf
   head.config_hash = config_hash;
   head.session = lio.session();
   std::vector<std::byte> bytes = record_of(head);
-  const std::vector<std::byte> body = record_of(lio);
+  const std::vector<std::byte> body =
+      record_of(lio, kBytesBesideMap + kBytesPerMapPoint * static_cast<std::size_t>(lio.map().size()));
   bytes.insert(bytes.end(), body.begin(), body.end());
   return bytes;
 }

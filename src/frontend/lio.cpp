@@ -25,6 +25,7 @@ constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may
 constexpr int kScansUntilReacquisition = 5;                // without a correction
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr double kConfirmationSeconds = 2.0;               // that a resumption has
+constexpr int kContradictionsOfAWrongPlace = 3;            // in a row; single ones come in any curve
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
@@ -120,12 +121,15 @@ void Lio::seek_confirmation(ScanReason reason) {
   if (!unaided_) return;
   if (!trust_.awaits_confirmation()) {
     unaided_.reset();
-  } else if (is_contradiction(reason)) {
-    filter_ = *unaided_;
-    cautious_ = unaided_->covariance;
-    scans_without_correction_ = kScansUntilReacquisition;
-    trust_.note_resumption();
+    return;
   }
+  contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
+  if (contradictions_ < kContradictionsOfAWrongPlace) return;
+  contradictions_ = 0;
+  filter_ = *unaided_;
+  cautious_ = unaided_->covariance;
+  scans_without_correction_ = kScansUntilReacquisition;
+  trust_.note_resumption();
 }
 
 /// Nobody knows where in the old map the vehicle is. Attitude to gravity, biases and velocity carry over.
@@ -280,8 +284,8 @@ ScanResult Lio::process(const Scan& scan) {
       tilt_of_blind_shifts(match.degeneracy, result.covariance.block<3, 3>(kPosition, kPosition));
   if (velocity_known_) {
     const FilterState published{filter_.nominal, result.covariance};
-    result.keyframe = keyframer_.add_scan(published, match.information_body, std::move(sparse),
-                                          !trust_.awaits_confirmation());
+    result.keyframe =
+        keyframer_.add_scan(published, match.information_body, std::move(sparse), !trust_.awaits_confirmation());
   }
   result.cloud = std::move(cloud);
   return result;

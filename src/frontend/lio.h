@@ -63,8 +63,8 @@ class Lio {
 
   /// After its state has been read back from bytes (see checkpoint.h): the time since then is a gap that the next
   /// samples close, and scans are searched for widely. Until ten of them have confirmed the pose none enters the map,
-  /// no keyframe is made, and one that contradicts takes back what the others said. A new session begins when the gap
-  /// is too long or the confirmation does not come.
+  /// no keyframe is made, and three in a row that contradict take back what the others said. A new session begins when
+  /// the gap is too long or the confirmation does not come.
   void resume();
 
   /// Whether a successor could go on from this state: started, and confirmed if it was resumed itself.

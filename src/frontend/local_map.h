@@ -91,16 +91,21 @@ class LocalMap {
   bool has_slid_ = false;
   Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();
 
-  /// Taken voxels alone.
+  /// Taken voxels alone, each in one go: there are many.
   friend void transfer(auto& io, FieldsOf<Block> auto& block) {
     io.matrix(block.coordinate);
     io.number(block.occupied);
     io.number(block.confirmed);
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
       const int bit = std::countr_zero(left);
-      for (auto& coordinate : block.local[bit]) io.number(coordinate);
-      io.number(block.scan[bit]);
-      io.number(block.weight[bit]);
+      auto& at = block.local[bit];
+      Eigen::Matrix<float, 5, 1> voxel(at[0], at[1], at[2], block.scan[bit], block.weight[bit]);
+      io.matrix(voxel);
+      if constexpr (requires { block.weight[bit] = 0; }) {
+        for (int axis = 0; axis < 3; ++axis) at[axis] = voxel[axis];
+        block.scan[bit] = voxel[3];
+        block.weight[bit] = static_cast<std::uint16_t>(voxel[4]);
+      }
     }
   }
 

@@ -61,7 +61,9 @@ Lio driven_until(double seconds, const Drive& input = drive()) {
 }
 
 /// A successor of `lio`, by way of bytes.
-Lio successor(const Lio& lio) { return start_from_checkpoint(test::tuned_config(), kHash, encode_checkpoint(lio, kHash)); }
+Lio successor(const Lio& lio) {
+  return start_from_checkpoint(test::tuned_config(), kHash, encode_checkpoint(lio, kHash));
+}
 
 double position_error(const ScanResult& scan, const Drive& input = drive()) {
   const Pose truth = input.truth(test::drive_seconds(input, scan.state.utime));
@@ -211,8 +213,7 @@ TEST(Checkpoint, DataThatAreTooFarAheadOrBehindBeginANewSession) {
 }
 
 TEST(Checkpoint, AnotherPlaceIsNeverTakenForTheOldOne) {
-  const Drive elsewhere =
-      test::simulate(test::street(), test::ellipse_drive(2.0, 6.0, 4.0, 2.0), 16.0, Sensors{}, 12);
+  const Drive elsewhere = test::simulate(test::street(), test::ellipse_drive(2.0, 6.0, 4.0, 2.0), 16.0, Sensors{}, 12);
   Lio after = successor(driven_until(9.0));
   for (const auto& [utime, trust] : feed(after, elsewhere, 9.5, 16.0).trust) {
     EXPECT_TRUE(trust != Trust::kOk || after.session() > 0) << test::drive_seconds(elsewhere, utime);
@@ -299,9 +300,8 @@ TEST(Checkpoint, ACheckpointThatWasCutShortIsNoticed) {
 TEST(Checkpoint, AKeyframeSurvivesItsBytesAndDamageIsNoticed) {
   Lio lio(test::tuned_config());
   const Stretch stretch = feed(lio, drive(), 0.0, 5.0);
-  const auto found = std::ranges::find_if(stretch.scans, [](const ScanResult& s) {
-    return s.keyframe && s.keyframe->id > 0;
-  });
+  const auto found =
+      std::ranges::find_if(stretch.scans, [](const ScanResult& s) { return s.keyframe && s.keyframe->id > 0; });
   ASSERT_NE(found, stretch.scans.end());
   Keyframe keyframe = *found->keyframe;
   keyframe.cloud.resize(20);

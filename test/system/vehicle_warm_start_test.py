@@ -176,7 +176,7 @@ def driven(
             print(
                 f"good after {kill.first_good_s:.2f} s, trusted after {kill.trusted_s:.2f} s, step {kill.step_m:.3f} m"
             )
-        yield vehicle.watch
+    yield vehicle.watch
 
 
 def test_the_first_good_pose_is_early_and_true(driven: Watch) -> None:
