@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <format>
+#include <iostream>
 
+#include "frontend/checkpoint.h"
 #include "runtime/channels.h"
 
 namespace ignis {
@@ -13,8 +15,8 @@ namespace {
 namespace channels = runtime::channels;
 
 constexpr int kPollMs = 100;
-constexpr std::size_t kKeyframesKept = 400;
 constexpr int kKeyframeRequestQueue = 100;
+constexpr Utime kCheckpointPeriod = 400'000;  // [us]
 
 /// Calls `work` and returns its result with the wall time it took [ms].
 template <class Work>
@@ -27,14 +29,40 @@ auto timed(Work&& work) {
 
 }  // namespace
 
-FrontendNode::FrontendNode(const runtime::Application& application)
-    : config_(application.config), link_(application), lio_(config_.frontend.filter) {
+FrontendNode::FrontendNode(const runtime::Application& application, const std::filesystem::path& checkpoint_folder)
+    : config_(application.config),
+      config_hash_(application.config_hash),
+      link_(application),
+      lio_(config_.frontend.filter) {
+  if (!checkpoint_folder.empty()) {
+    checkpoints_ = std::make_unique<CheckpointFolder>(checkpoint_folder);
+    resume();
+  }
   link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue, [this](const imu_t& message) { on_imu(message); });
   scan_counts_ = &link_.subscribe<scan_t>(channels::kScan, config_.lcm.scan_queue,
                                           [this](const scan_t& part) { on_scan_part(part); });
   link_.subscribe<keyframe_request_t>(
       channels::kKeyframeRequest, kKeyframeRequestQueue,
       [this](const keyframe_request_t& request) { on_request(request); }, runtime::Senders::kSeveral);
+}
+
+void FrontendNode::resume() {
+  lio_ = start_from_checkpoint(config_.frontend.filter, config_hash_, checkpoints_->load());
+  sent_keyframes_ = checkpoints_->load_keyframes(lio_.session());
+}
+
+/// Before anybody hears of a keyframe it is safe, and so is that its id is used: a successor neither reuses the id nor
+/// leaves a hole.
+void FrontendNode::keep(std::span<const ScanResult> scans) {
+  if (!checkpoints_ || scans.empty() || !lio_.can_be_resumed()) return;
+  const auto has_keyframe = [](const ScanResult& scan) { return scan.keyframe.has_value(); };
+  const bool due = scans.back().stats.utime - last_checkpoint_ >= kCheckpointPeriod;
+  if (!due && std::ranges::none_of(scans, has_keyframe)) return;
+  for (const ScanResult& scan : scans) {
+    if (scan.keyframe) checkpoints_->save_keyframe(*scan.keyframe);
+  }
+  checkpoints_->save(encode_checkpoint(lio_, config_hash_));
+  last_checkpoint_ = scans.back().stats.utime;
 }
 
 void FrontendNode::spin_once() {
@@ -45,7 +73,7 @@ void FrontendNode::spin_once() {
 void FrontendNode::on_imu(const imu_t& message) {
   const auto [result, milliseconds] = timed([&] { return lio_.add_imu(messages::from_message(message)); });
   newest_utime_ = std::max(newest_utime_, message.utime);
-  for (const ScanResult& scan : result.scans) publish_scan(scan, milliseconds);
+  publish(result.scans, milliseconds);
   if (result.state) publish_state(*result.state, nullptr);
 }
 
@@ -54,7 +82,12 @@ void FrontendNode::on_scan_part(const scan_t& part) {
   scan_counts_->queue_drops = assembler_.incomplete();
   if (!scan) return;
   const auto [results, milliseconds] = timed([&] { return lio_.add_scan(std::move(*scan)); });
-  for (const ScanResult& result : results) publish_scan(result, milliseconds);
+  publish(results, milliseconds);
+}
+
+void FrontendNode::publish(std::span<const ScanResult> scans, double milliseconds) {
+  keep(scans);
+  for (const ScanResult& scan : scans) publish_scan(scan, milliseconds);
 }
 
 void FrontendNode::publish_state(const NavState& state, const Matrix15d* covariance) {
@@ -83,7 +116,7 @@ void FrontendNode::publish_scan(const ScanResult& scan, double milliseconds) {
 void FrontendNode::publish_keyframe(const Keyframe& keyframe) {
   for (const keyframe_t& part : messages::to_messages(keyframe)) link_.publish(channels::kKeyframe, part);
   sent_keyframes_.push_back(keyframe);
-  if (sent_keyframes_.size() > kKeyframesKept) sent_keyframes_.pop_front();
+  if (std::ssize(sent_keyframes_) > CheckpointFolder::kKeyframes) sent_keyframes_.pop_front();
 }
 
 void FrontendNode::on_request(const keyframe_request_t& request) {
@@ -95,7 +128,15 @@ void FrontendNode::on_request(const keyframe_request_t& request) {
 }
 
 void FrontendNode::publish_health() {
-  const LioStatus status = lio_.status();
+  if (lio_.start_note() != told_note_) {
+    told_note_ = lio_.start_note();
+    std::cerr << "lio_frontend: " << told_note_ << std::endl;
+  }
+  LioStatus status = lio_.status();
+  if (checkpoints_ && !checkpoints_->failure().empty()) {
+    status.trust = std::max(status.trust, Trust::kDegraded);
+    status.reason += "; " + checkpoints_->failure();
+  }
   static_assert(static_cast<int>(Trust::kOk) == health_t::OK &&
                 static_cast<int>(Trust::kDegraded) == health_t::DEGRADED &&
                 static_cast<int>(Trust::kLost) == health_t::LOST);

@@ -2,8 +2,12 @@
 #pragma once
 
 #include <deque>
-#include <map>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
 
+#include "checkpoint_folder.h"
 #include "frontend/lio.h"
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
@@ -15,7 +19,9 @@ namespace ignis {
 /// Wires the odometry core to the bus. One thread; LCM's own receives meanwhile into the queues.
 class FrontendNode {
  public:
-  explicit FrontendNode(const runtime::Application& application);
+  /// Goes on from the checkpoint in a folder, and keeps one there; empty: without. Throws runtime::UserError when the
+  /// folder cannot be used.
+  FrontendNode(const runtime::Application& application, const std::filesystem::path& checkpoint_folder);
 
   /// Handles what has arrived and reports health. Returns within about 100 ms.
   void spin_once();
@@ -27,14 +33,21 @@ class FrontendNode {
   void publish_state(const NavState& state, const Matrix15d* covariance);
   void publish_scan(const ScanResult& scan, double milliseconds);
   void publish_keyframe(const Keyframe& keyframe);
+  void publish(std::span<const ScanResult> scans, double milliseconds);
   void publish_health();
+  void resume();
+  void keep(std::span<const ScanResult> scans);
 
   runtime::IgnisConfig config_;
+  std::string config_hash_;
   runtime::LcmLink link_;
   runtime::ReceiverCounts* scan_counts_ = nullptr;
   Lio lio_;
   messages::ScanAssembler assembler_;
   std::deque<Keyframe> sent_keyframes_;  // ring for KEYFRAME_REQUEST
+  std::unique_ptr<CheckpointFolder> checkpoints_;
+  std::string told_note_;      // Lio::start_note() as it was last printed
+  Utime last_checkpoint_ = 0;  // [us] scan time
   Utime newest_utime_ = 0;
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;

@@ -18,9 +18,10 @@ from ignis.doctoring.data import Heard, check_data, hear
 from ignis.doctoring.finding import Finding, Severity, exit_code
 from ignis.doctoring.host import check_host
 from ignis.doctoring.mount import check_mount
-from ignis.doctoring.network import check_bus
+from ignis.doctoring.network import check_bus, reaches_other_computers
 from ignis.doctoring.sensor import check_sensor
 from ignis.doctoring.software import check_software
+from ignis.doctoring.synchronisation import check_synchronisation, read_kernel_clock
 from ignis.errors import InputError, run_command
 from ignis.mounts import effective_config
 from ignis.places import default_config, program_folder, types_jar
@@ -72,6 +73,7 @@ def examine(config: dict[str, Any], options: argparse.Namespace) -> list[Finding
     return [
         *check_software(program_folder(), types_jar()),
         *check_host(Path("/"), options.folder, built),
+        check_synchronisation(*read_kernel_clock(), several_computers=reaches_other_computers(url)),
         *check_bus(config, view_is_ours=heard.runs("map_builder")),
         *check_sensor(
             options.port or config["driver"]["port"], config["driver"]["baud"], driver_runs=heard.runs("l1_driver")

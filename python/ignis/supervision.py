@@ -40,7 +40,7 @@ class Supervisor(Protocol):
 
 
 def default_state_folder() -> Path:
-    """Where s6, logs and the back end's journal live."""
+    """Where s6, logs, the back end's journal and the front end's checkpoint live."""
     base = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     return Path(os.environ.get("IGNIS_STATE") or f"{base}/ignis")
 
@@ -78,6 +78,8 @@ def choose_supervisor(
             commands["map_builder"] += ["--port", str(view_port)]
         if "graph_backend" in commands:
             commands["graph_backend"] += ["--journal", str(state / "journal")]
+        if "lio_frontend" in commands:
+            commands["lio_frontend"] += ["--checkpoint", str(state / "checkpoint")]
     return S6Supervisor(state, commands, {"LCM_DEFAULT_URL": url} if url else {})
 
 

@@ -4,33 +4,13 @@
 #include <algorithm>
 #include <format>
 
-#include "backend/byte_codec.h"
+#include "common/byte_codec.h"
+#include "common/measurement_bytes.h"
 
 namespace ignis {
 
 // One function per struct, in the order of its members, for both directions. They stand in the structs' own namespace,
 // where the codec's templates look for them.
-
-void transfer(auto& io, FieldsOf<Pose> auto& pose) {
-  io.matrix(pose.rotation.coeffs());
-  io.matrix(pose.translation);
-}
-
-void transfer(auto& io, FieldsOf<NavState> auto& state) {
-  io.number(state.utime);
-  transfer(io, state.T_odom_body);
-  io.matrix(state.v_odom);
-  io.matrix(state.gyro_bias);
-  io.matrix(state.accel_bias);
-  io.matrix(state.angular_rate);
-}
-
-void transfer(auto& io, FieldsOf<CloudPoint> auto& point) {
-  io.matrix(point.position);
-  io.number(point.intensity);
-}
-
-void transfer(auto& io, FieldsOf<std::vector<CloudPoint>> auto& cloud) { io.list(cloud); }
 
 void transfer(auto& io, FieldsOf<ImuSum> auto& sum) {
   io.number(sum.duration_s);

@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "common/byte_record.h"
+
 /// The journal of the graph as bytes: a head, then one record per change of the graph, appended and never altered. A
-/// record is its length (uint32), the CRC-32 of its payload (uint32) and the payload (ChangeTracker makes it).
-/// Little-endian. Files stand in apps/graph_backend.
+/// record is that of common/byte_record.h, its payload what ChangeTracker makes. Files stand in apps/graph_backend.
 namespace ignis {
 
 inline constexpr std::uint32_t kJournalVersion = 1;
@@ -35,9 +36,6 @@ struct JournalContents {
 };
 
 [[nodiscard]] std::vector<std::byte> encode_head(const JournalHead& head);
-
-/// One record. Throws std::length_error when the payload exceeds 256 MB.
-[[nodiscard]] std::vector<std::byte> encode_record(std::span<const std::byte> payload);
 
 /// Any bytes at all.
 [[nodiscard]] JournalContents read_journal(std::span<const std::byte> bytes);

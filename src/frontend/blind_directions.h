@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "common/byte_codec.h"
 #include "frontend/degeneracy.h"
 
 namespace ignis {
@@ -33,6 +34,17 @@ class BlindDirections {
   double held_length_ = 1.0;                      ///< [m] that scales attitude there: another one would tilt them
   int held_scans_ = 0;                            ///< in the mean; 0: nothing is blind
   int disagreeing_ = 0;                           ///< scans in a row that found more blind directions than are held
+
+  friend void transfer(auto& io, FieldsOf<BlindDirections> auto& directions) {
+    io.matrix(directions.sensitivity_);
+    io.matrix(directions.noise_);
+    io.matrix(directions.held_sensitivity_);
+    io.matrix(directions.held_basis_);
+    for (auto& blind : directions.blind_) io.number(blind);
+    io.number(directions.held_length_);
+    io.number(directions.held_scans_);
+    io.number(directions.disagreeing_);
+  }
 };
 
 }  // namespace ignis

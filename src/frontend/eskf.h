@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "common/byte_codec.h"
+#include "common/measurement_bytes.h"
 #include "common/measurements.h"
 #include "common/nav_state.h"
 #include "frontend/frontend_config.h"
@@ -22,6 +24,11 @@ struct FilterState {
   NavState nominal;
   Matrix15d covariance = Matrix15d::Identity();
 };
+
+void transfer(auto& io, FieldsOf<FilterState> auto& filter) {
+  transfer(io, filter.nominal);
+  io.matrix(filter.covariance);
+}
 
 /// Specific force and angular rate, constant over a step. Biased, as measured, body axes.
 struct InertialInput {

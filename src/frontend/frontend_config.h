@@ -63,6 +63,7 @@ struct FrontendConfig {
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
   double imu_timeout_s = 0.5;
+  double resume_max_gap_s = 3.0;
   double degraded_sigma_m = 0.15;
   double lost_sigma_m = 1.0;
   int min_scan_points = 50;
@@ -192,6 +193,9 @@ struct FrontendConfig {
                  "neighbour radius for points that find too few within match_radius_m; 0: none");
     visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",
                  "scan time without IMU data after which scans go on alone, at constant velocity");
+    visit.number("resume_max_gap_s", self.resume_max_gap_s, {0.0, 10.0}, "s",
+                 "a restarted front end goes on where its predecessor was killed when the IMU data that it missed are "
+                 "no longer than this; 0: it always begins a new session");
     visit.number("degraded_sigma_m", self.degraded_sigma_m, {0.001, 1000.0}, "m",
                  "largest position sigma of a pose that is reported as OK");
     visit.number("lost_sigma_m", self.lost_sigma_m, {0.001, 1000.0}, "m",

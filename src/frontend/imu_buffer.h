@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "common/byte_codec.h"
+#include "common/measurement_bytes.h"
 #include "common/measurements.h"
 
 namespace ignis {
@@ -28,6 +30,18 @@ struct ImuCounters {
   std::int64_t leaps = 0;      ///< stamps far ahead of the stream, put aside
   std::int64_t coasted = 0;    ///< made up where the IMU was silent
 };
+
+void transfer(auto& io, FieldsOf<ImuCounters> auto& counters) {
+  io.number(counters.accepted);
+  io.number(counters.not_finite);
+  io.number(counters.implausible);
+  io.number(counters.duplicate);
+  io.number(counters.late);
+  io.number(counters.gaps);
+  io.number(counters.saturated);
+  io.number(counters.leaps);
+  io.number(counters.coasted);
+}
 
 /// The recent IMU samples in time order, and what is wrong with their stream. The nominal period is learned from the
 /// data (running median), so 250 Hz, 100 Hz and 10 Hz streams need no configuration.
@@ -68,6 +82,15 @@ class ImuBuffer {
   std::size_t interval_count_ = 0;
   std::optional<Utime> put_aside_;  ///< stamp of the last leap
   ImuCounters counters_;
+
+  friend void transfer(auto& io, FieldsOf<ImuBuffer> auto& buffer) {
+    io.list(buffer.samples_);
+    io.list(buffer.periods_before_);
+    for (auto& interval : buffer.intervals_us_) io.number(interval);
+    io.number(buffer.interval_count_);
+    io.maybe(buffer.put_aside_);
+    transfer(io, buffer.counters_);
+  }
 };
 
 }  // namespace ignis

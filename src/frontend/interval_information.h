@@ -38,6 +38,16 @@ class IntervalInformation {
   InertialInput sum_;  ///< of the samples since the newest scan
   int samples_ = 0;
   bool informed_ = false;  ///< a scan has said something
+
+  friend void transfer(auto& io, FieldsOf<IntervalInformation> auto& interval) {
+    transfer(io, interval.state_);
+    io.matrix(interval.with_scans_);
+    io.matrix(interval.without_scans_);
+    io.matrix(interval.sum_.gyro);
+    io.matrix(interval.sum_.accel);
+    io.number(interval.samples_);
+    io.number(interval.informed_);
+  }
 };
 
 }  // namespace ignis

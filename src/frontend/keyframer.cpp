@@ -35,7 +35,7 @@ void Keyframer::add_imu(const ImuSample& sample) {
 }
 
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
-                                            std::vector<CloudPoint> cloud) {
+                                            std::vector<CloudPoint> cloud, bool confirmed) {
   const NavState& state = filter.nominal;
   recent_.push_back({state.utime, state.T_odom_body, std::move(cloud)});
   const Utime oldest = state.utime - to_micros(config_.keyframe_cloud_seconds);
@@ -44,7 +44,7 @@ std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Mat
   if (next_id_ > 0) information_.add_scan(state, information_body);
   ++scans_;
   note_motion(state);
-  if (!due(state)) return std::nullopt;
+  if (!confirmed || !due(state)) return std::nullopt;
   return make(filter);
 }
 

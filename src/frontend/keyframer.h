@@ -25,9 +25,9 @@ class Keyframer {
   void note_gap() { imu_complete_ = false; }
 
   /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied. `cloud` is in
-  /// the body frame at that state.
+  /// the body frame at that state. A keyframe that is due waits while the pose is not `confirmed`.
   std::optional<Keyframe> add_scan(const FilterState& filter, const Matrix6d& information_body,
-                                   std::vector<CloudPoint> cloud);
+                                   std::vector<CloudPoint> cloud, bool confirmed = true);
 
  private:
   struct RegisteredScan {
@@ -53,6 +53,25 @@ class Keyframer {
   int scans_ = 0;                  ///< in the interval
   double speed2_sum_ = 0.0;        ///< [m^2/s^2] over the scans of the interval
   double max_displacement_ = 0.0;  ///< [m] from the last keyframe
+
+  friend void transfer(auto& io, FieldsOf<RegisteredScan> auto& scan) {
+    io.number(scan.utime);
+    transfer(io, scan.T_odom_body);
+    io.list(scan.cloud);
+  }
+
+  friend void transfer(auto& io, FieldsOf<Keyframer> auto& keyframer) {
+    io.number(keyframer.session_);
+    io.number(keyframer.next_id_);
+    transfer(io, keyframer.last_);
+    io.list(keyframer.recent_);
+    io.list(keyframer.imu_);
+    io.number(keyframer.imu_complete_);
+    transfer(io, keyframer.information_);
+    io.number(keyframer.scans_);
+    io.number(keyframer.speed2_sum_);
+    io.number(keyframer.max_displacement_);
+  }
 };
 
 }  // namespace ignis

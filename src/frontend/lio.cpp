@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <format>
 #include <utility>
 
 #include "frontend/deskew.h"
@@ -23,6 +24,8 @@ constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind th
 constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
 constexpr int kScansUntilReacquisition = 5;                // without a correction
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
+constexpr double kConfirmationSeconds = 2.0;               // that a resumption has
+constexpr int kContradictionsOfAWrongPlace = 3;            // in a row; single ones come in any curve
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
@@ -48,14 +51,16 @@ void condition_on_attitude(FilterState& filter) {
 
 }  // namespace
 
-Lio::Lio(const FrontendConfig& config)
+Lio::Lio(const FrontendConfig& config, std::int32_t session, std::string note)
     : config_(config),
+      session_(session),
       initialisation_(config),
       matcher_(config),
       map_(config),
       drift_(config.map_drift),
-      keyframer_(config, 0),
-      trust_(config) {}
+      keyframer_(config, session),
+      trust_(config),
+      start_note_(std::move(note)) {}
 
 void Lio::reset() {
   ++session_;
@@ -76,6 +81,64 @@ void Lio::reset() {
   trust_ = TrustMonitor(config_);
   last_clipped_.reset();
   last_standstill_.reset();
+  resumed_from_.reset();
+  confirm_until_.reset();
+  unaided_.reset();
+}
+
+void Lio::resume() {
+  resumed_from_ = imu_.newest();
+  unaided_ = filter_;
+  scans_without_correction_ = kScansUntilReacquisition;
+  trust_.note_resumption();
+  start_note_ = std::format("going on with session {}", session_);
+}
+
+bool Lio::can_be_resumed() const { return running_ && velocity_known_ && !trust_.awaits_confirmation(); }
+
+bool Lio::is_sound() const {
+  Matrix15d covariance = filter_.covariance;
+  Matrix15d cautious = cautious_;
+  const NavState& state = filter_.nominal;
+  return running_ && !imu_.empty() && make_symmetric(covariance) && make_symmetric(cautious) &&
+         state.T_odom_body.all_finite() && state.v_odom.allFinite() && state.gyro_bias.allFinite() &&
+         state.accel_bias.allFinite();
+}
+
+/// The first sample after a restart decides whether the gap can be bridged.
+void Lio::close_gap(Utime first_sample) {
+  const double gap = seconds_between(*resumed_from_, first_sample);
+  resumed_from_.reset();
+  confirm_until_ = first_sample + to_micros(kConfirmationSeconds);
+  if (gap > 0.0 && gap <= config_.resume_max_gap_s) return;
+  reset();
+  start_note_ = std::format("new session: the checkpoint is {:.1f} s older than the data (limit {:.1f})", gap,
+                            config_.resume_max_gap_s);
+}
+
+/// The first scan after a gap may settle in a wrong place, and then says so with confidence. The next ones tell.
+void Lio::seek_confirmation(ScanReason reason) {
+  if (!unaided_) return;
+  if (!trust_.awaits_confirmation()) {
+    unaided_.reset();
+    return;
+  }
+  contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
+  if (contradictions_ < kContradictionsOfAWrongPlace) return;
+  contradictions_ = 0;
+  filter_ = *unaided_;
+  cautious_ = unaided_->covariance;
+  scans_without_correction_ = kScansUntilReacquisition;
+  trust_.note_resumption();
+}
+
+/// Nobody knows where in the old map the vehicle is. Attitude to gravity, biases and velocity carry over.
+void Lio::give_up_resumption() {
+  filter_ = *unaided_;
+  cautious_ = unaided_->covariance;
+  unaided_.reset();
+  begin_new_map();
+  start_note_ = "new session: scans did not confirm the pose of the checkpoint";
 }
 
 LioStatus Lio::status() const {
@@ -83,12 +146,14 @@ LioStatus Lio::status() const {
   status.running = running_;
   status.text = initialisation_.report();
   status.trust = running_ ? trust_.trust() : Trust::kDegraded;
-  status.reason = running_ ? trust_.reason() : status.text;
+  status.reason = running_ ? trust_.reason() : start_note_.empty() ? status.text : start_note_ + "; " + status.text;
   return status;
 }
 
 ImuResult Lio::add_imu(const ImuSample& sample) {
   ImuResult result;
+  if (resumed_from_) close_gap(sample.utime);
+  if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
   result.fault = imu_.add(sample);
   if (result.fault != ImuFault::kNone) return result;
   trust_.note_imu(sample.utime);
@@ -119,6 +184,7 @@ void Lio::start(const FilterState& first) {
   running_ = true;
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
+  if (!start_note_.empty()) trust_.note_uncertain_start();
   if (!velocity_known_) return;
   // The first pose defines the frame of the map; that this frame may not be level is drift, not an error of the pose in
   // it. Gravity's direction in that frame is then what the accelerometer bias has to account for.
@@ -132,6 +198,10 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
                       (last_scan_end_ && scan.end_utime() <= *last_scan_end_) ||
                       (!imu_.empty() && scan.end_utime() > imu_.newest() + kMaxLeadUs);
   std::vector<ScanResult> results;
+  if (resumed_from_) {
+    results.push_back(refuse(scan, ScanReason::kNoImu));
+    return results;
+  }
   if (broken) {
     results.push_back(refuse(scan, ScanReason::kBadStamp));
     return results;
@@ -195,6 +265,7 @@ ScanResult Lio::process(const Scan& scan) {
   count_correction(match);
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
+  seek_confirmation(match.stats.reason);
   match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(selection.scan, match.stats.reason, cloud, sparse);
   enter_map(cloud, match);
@@ -213,7 +284,8 @@ ScanResult Lio::process(const Scan& scan) {
       tilt_of_blind_shifts(match.degeneracy, result.covariance.block<3, 3>(kPosition, kPosition));
   if (velocity_known_) {
     const FilterState published{filter_.nominal, result.covariance};
-    result.keyframe = keyframer_.add_scan(published, match.information_body, std::move(sparse));
+    result.keyframe =
+        keyframer_.add_scan(published, match.information_body, std::move(sparse), !trust_.awaits_confirmation());
   }
   result.cloud = std::move(cloud);
   return result;
@@ -266,6 +338,7 @@ void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<C
 
 /// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.
 void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match) {
+  if (trust_.awaits_confirmation()) return;
   const bool applied = match.stats.applied();
   if (applied && match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
   if (applied) drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans);
@@ -365,8 +438,10 @@ void Lio::advance_to(Utime utime) {
     FilterState cautious{filter_.nominal, cautious_};
     predict(cautious, input, dt, config_, noise_scale(next));
     cautious_ = cautious.covariance;
+    if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
     predict(filter_, input, dt, config_, noise_scale(next));
     now = step_end;
+    if (unaided_) unaided_->nominal.utime = now;
   }
 }
 

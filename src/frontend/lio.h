@@ -52,13 +52,29 @@ struct LioStatus {
 /// is at most `max_scan_delay_s` late. Not for concurrent use. Holds no clock: time is what the stamps say.
 class Lio {
  public:
-  explicit Lio(const FrontendConfig& config);
+  /// Waits for the start of a session. `note` is why it does not go on with an earlier one, for people.
+  explicit Lio(const FrontendConfig& config, std::int32_t session = 0, std::string note = {});
 
   [[nodiscard]] ImuResult add_imu(const ImuSample& sample);
   [[nodiscard]] std::vector<ScanResult> add_scan(Scan scan);
 
   /// Forgets everything and starts a new session.
   void reset();
+
+  /// After its state has been read back from bytes (see checkpoint.h): the time since then is a gap that the next
+  /// samples close, and scans are searched for widely. Until ten of them have confirmed the pose none enters the map,
+  /// no keyframe is made, and three in a row that contradict take back what the others said. A new session begins when
+  /// the gap is too long or the confirmation does not come.
+  void resume();
+
+  /// Whether a successor could go on from this state: started, and confirmed if it was resumed itself.
+  [[nodiscard]] bool can_be_resumed() const;
+
+  /// What became of an earlier session at this start; empty when there was none.
+  [[nodiscard]] const std::string& start_note() const { return start_note_; }
+
+  /// All numbers are finite, and the covariance is one.
+  [[nodiscard]] bool is_sound() const;
 
   [[nodiscard]] LioStatus status() const;
   [[nodiscard]] const ImuCounters& imu_counters() const { return imu_.counters(); }
@@ -84,6 +100,9 @@ class Lio {
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
   void start(const FilterState& first);
+  void give_up_resumption();
+  void close_gap(Utime first_sample);
+  void seek_confirmation(ScanReason reason);
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;
 
@@ -110,6 +129,33 @@ class Lio {
   int scans_without_correction_ = 0;      ///< in a row
   std::optional<Utime> last_standstill_;  ///< instant of the last correction to zero velocity
   std::optional<Utime> last_clipped_;     ///< instant of the newest sample that says nothing about the biases
+  std::optional<Utime> resumed_from_;     ///< newest sample of the predecessor, until the first own one
+  std::optional<Utime> confirm_until_;    ///< when a resumption is given up
+  std::optional<FilterState> unaided_;    ///< the same state without a scan since the resumption, until it is confirmed
+  std::string start_note_;
+
+  /// Everything that later results depend on. Scans that wait for their IMU samples are left out: they are lost with
+  /// the process, like the data after them.
+  friend void transfer(auto& io, FieldsOf<Lio> auto& lio) {
+    io.number(lio.session_);
+    transfer(io, lio.imu_);
+    transfer(io, lio.matcher_);
+    transfer(io, lio.map_);
+    transfer(io, lio.drift_);
+    transfer(io, lio.keyframer_);
+    transfer(io, lio.trust_);
+    io.maybe(lio.last_scan_end_);
+    io.number(lio.running_);
+    transfer(io, lio.filter_);
+    io.matrix(lio.cautious_);
+    transfer(io, lio.live_);
+    io.number(lio.velocity_known_);
+    io.number(lio.applied_scans_);
+    io.number(lio.contradictions_);
+    io.number(lio.scans_without_correction_);
+    io.maybe(lio.last_standstill_);
+    io.maybe(lio.last_clipped_);
+  }
 };
 
 }  // namespace ignis

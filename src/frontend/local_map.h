@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -8,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "common/byte_codec.h"
 #include "common/pose.h"
 #include "frontend/frontend_config.h"
 #include "frontend/plane_fit.h"
@@ -108,6 +110,35 @@ class LocalMap {
   std::int64_t inserted_points_ = 0;
   bool has_slid_ = false;
   Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();
+
+  /// Taken voxels alone, each in one go: there are many.
+  friend void transfer(auto& io, FieldsOf<Block> auto& block) {
+    io.matrix(block.coordinate);
+    io.number(block.occupied);
+    io.number(block.confirmed);
+    for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
+      const int bit = std::countr_zero(left);
+      auto& scan = block.rows[bit / kEdge].scan[bit % kEdge];
+      Eigen::Matrix<float, 5, 1> voxel;
+      voxel << block.point(bit), scan, block.weight[bit];
+      io.matrix(voxel);
+      if constexpr (requires { block.weight[bit] = 0; }) {
+        block.set_point(bit, voxel.head<3>());
+        scan = voxel[3];
+        block.weight[bit] = static_cast<std::uint16_t>(voxel[4]);
+      }
+    }
+  }
+
+  friend void transfer(auto& io, FieldsOf<LocalMap> auto& map) {
+    io.list(map.blocks_);
+    io.number(map.size_);
+    io.number(map.scans_);
+    io.number(map.inserted_points_);
+    io.number(map.has_slid_);
+    io.matrix(map.last_slide_);
+    if constexpr (requires { map.rebuild_regions(); }) map.rebuild_regions();
+  }
 };
 
 }  // namespace ignis

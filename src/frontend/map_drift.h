@@ -42,6 +42,11 @@ class MapDrift {
   double scale_;
   Matrix6d covariance_ = Matrix6d::Zero();
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< where covariance_ is meant
+
+  friend void transfer(auto& io, FieldsOf<MapDrift> auto& drift) {
+    io.matrix(drift.covariance_);
+    io.matrix(drift.position_);
+  }
 };
 
 }  // namespace ignis

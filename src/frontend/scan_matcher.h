@@ -89,6 +89,8 @@ class ScanMatcher {
   double map_noise_ = 1.0;  ///< factor on the variance of a point for the map's own errors
   double mean_range_ = 1.0;
   double mean_map_scan_ = 0.0;  ///< number of the scan that a met map point comes from
+
+  friend void transfer(auto& io, FieldsOf<ScanMatcher> auto& matcher) { transfer(io, matcher.blind_directions_); }
 };
 
 }  // namespace ignis

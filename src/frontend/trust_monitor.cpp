@@ -12,6 +12,7 @@ constexpr int kScansUntilDegraded = 5;     // without a correction
 constexpr double kSecondsUntilLost = 2.0;  // without a correction
 constexpr double kSilentImuSeconds = 0.1;  // of scan time
 constexpr int kScansToConfirm = 10;        // applied ones, after silence or a loss
+constexpr int kScansToConfirmStart = 60;   // the second opinion needs 2 s, and something to go on
 constexpr double kOpinionSeconds = 2.0;    // over which scans and IMU are compared
 constexpr double kMaxDisagreement = 8.0;   // sigma
 
@@ -44,11 +45,28 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   last_applied_ = stats.utime;
   scans_since_applied_ = 0;
   scans_to_confirm_ = std::max(scans_to_confirm_ - 1, 0);
-  if (scans_to_confirm_ == 0) lost_ = false;
+  if (scans_to_confirm_ > 0) return;
+  lost_ = false;
+  // What closed the gap says nothing about how scans and IMU agree.
+  if (resumed_) corrections_.clear();
+  resumed_ = false;
+  uncertain_start_ = false;
+}
+
+void TrustMonitor::note_uncertain_start() {
+  uncertain_start_ = true;
+  scans_to_confirm_ = kScansToConfirmStart;
+}
+
+void TrustMonitor::note_resumption() {
+  resumed_ = true;
+  scans_to_confirm_ = kScansToConfirm;
+  corrections_.clear();
 }
 
 void TrustMonitor::note_loss() {
   lost_ = true;
+  resumed_ = false;
   ++losses_;
   scans_to_confirm_ = kScansToConfirm;
   corrections_.clear();
@@ -96,6 +114,10 @@ std::string TrustMonitor::reason() const {
   if (seconds_without_imu() > kSilentImuSeconds) {
     return std::format("no IMU data for {:.1f} s, going on with scans alone", seconds_without_imu());
   }
+  if (disagreement() <= kMaxDisagreement && uncertain_start_) {
+    return std::format("new session after a restart, {} applied scans to go", scans_to_confirm_);
+  }
+  if (resumed_) return std::format("resumed after a restart, {} applied scans to go", scans_to_confirm_);
   if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
   if (disagreement() > kMaxDisagreement) {
     return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "common/byte_codec.h"
 #include "common/time.h"
 #include "frontend/frontend_config.h"
 #include "frontend/scan_stats.h"
@@ -43,6 +44,11 @@ class TrustMonitor {
   void note_scan(const ScanEvidence& evidence);
   /// The local map was given up; from here on the pose says nothing about where the vehicle was before.
   void note_loss();
+  /// The filter goes on from a checkpoint. Until scans have confirmed it, the pose is dead reckoning over a gap.
+  void note_resumption();
+  [[nodiscard]] bool awaits_confirmation() const { return resumed_; }
+  /// A start in the middle of a drive, perhaps: to the IMU constant velocity looks like rest, and only scans tell.
+  void note_uncertain_start();
 
   [[nodiscard]] Trust trust() const;
   /// Why the trust is not kOk; what happened last when it is.
@@ -67,10 +73,32 @@ class TrustMonitor {
   int scans_since_applied_ = 0;
   int scans_to_confirm_ = 0;  ///< that have to be applied before the trust comes back
   bool lost_ = false;
+  bool resumed_ = false;  ///< from a checkpoint, and not yet confirmed
+  bool uncertain_start_ = false;
   int losses_ = 0;
   double position_sigma_ = 0.0;
   double accel_bias_sigma_ = 0.0;
   std::deque<Correction> corrections_;
+
+  friend void transfer(auto& io, FieldsOf<Correction> auto& correction) {
+    io.number(correction.utime);
+    io.matrix(correction.velocity);
+  }
+
+  friend void transfer(auto& io, FieldsOf<TrustMonitor> auto& monitor) {
+    io.maybe(monitor.newest_imu_);
+    io.maybe(monitor.newest_scan_);
+    io.maybe(monitor.last_applied_);
+    io.text(monitor.last_reason_);
+    io.number(monitor.scans_since_applied_);
+    io.number(monitor.scans_to_confirm_);
+    io.number(monitor.lost_);
+    io.number(monitor.uncertain_start_);
+    io.number(monitor.losses_);
+    io.number(monitor.position_sigma_);
+    io.number(monitor.accel_bias_sigma_);
+    io.list(monitor.corrections_);
+  }
 };
 
 }  // namespace ignis

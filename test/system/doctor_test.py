@@ -19,9 +19,10 @@ from ignis.doctoring.finding import EXIT_WARNINGS, Finding, Severity, exit_code
 from ignis.doctoring.host import check_clock, check_disk, check_governor, check_receive_buffers
 from ignis.doctoring.mount import check_mount
 from ignis.doctoring.network import check_port as check_view_port
-from ignis.doctoring.network import check_url
+from ignis.doctoring.network import check_url, reaches_other_computers
 from ignis.doctoring.sensor import check_sensor
 from ignis.doctoring.software import check_jar, check_versions
+from ignis.doctoring.synchronisation import check_synchronisation, read_kernel_clock
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
@@ -76,6 +77,27 @@ def test_large_receive_buffers_are_accepted(tmp_path: Path) -> None:
 def test_clock_before_the_build_is_found() -> None:
     assert check_clock(now=0.0, built=1.7e9).severity == Severity.ERROR
     assert check_clock(now=1.8e9, built=1.7e9).severity == Severity.OK
+
+
+def test_clock_that_nobody_keeps_right_matters_between_computers() -> None:
+    unsynchronised, synchronised = 0x0041, 0x2001
+    severities = {
+        (status, error, several): check_synchronisation(status, error, several_computers=several).severity
+        for status, error in ((unsynchronised, 16.0), (synchronised, 0.2), (synchronised, 0.004))
+        for several in (False, True)
+    }
+    assert list(severities.values()) == [
+        *(Severity.NOTE, Severity.WARNING),
+        *(Severity.OK, Severity.WARNING),
+        *(Severity.OK, Severity.OK),
+    ]
+    assert worst([check_synchronisation(unsynchronised, 16.0, several_computers=True)]).fix
+    assert reaches_other_computers(URL.replace("ttl=0", "ttl=1")) and not reaches_other_computers(URL)
+
+
+def test_kernel_clock_is_read_without_rights() -> None:
+    status, error = read_kernel_clock()
+    assert 0 <= status < 1 << 17 and error >= 0.0
 
 
 def test_full_disk_is_found(tmp_path: Path) -> None:

@@ -42,6 +42,14 @@ def _parts(url: str) -> tuple[str, int, int]:
     return split.hostname or "239.255.76.67", int(query.get("ttl", 0)), int(query.get("recv_buf_size", 0))
 
 
+def reaches_other_computers(url: str) -> bool:
+    """Whether messages leave this computer; False when the URL cannot be understood, which check_url says."""
+    try:
+        return url.startswith("udpm:") and _parts(url)[1] > 0
+    except ValueError:
+        return False
+
+
 def check_url(url: str) -> Iterator[Finding]:
     """TTL and receive buffer."""
     if not url.startswith("udpm:"):

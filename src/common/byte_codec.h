@@ -22,16 +22,17 @@ static_assert(std::endian::native == std::endian::little, "files are little-endi
 template <class T, class Struct>
 concept FieldsOf = std::same_as<std::remove_const_t<T>, Struct>;
 
+template <class T>
+concept Number = std::is_arithmetic_v<std::remove_const_t<T>> || std::is_enum_v<std::remove_const_t<T>>;
+
+void transfer(auto& io, Number auto& value) { io.number(value); }
+
 /// Appends.
 class ByteWriter {
  public:
   explicit ByteWriter(std::vector<std::byte>& bytes) : bytes_(bytes) {}
 
-  template <class Number>
-    requires std::is_arithmetic_v<Number> || std::is_enum_v<Number>
-  void number(const Number& value) {
-    raw(&value, sizeof value);
-  }
+  void number(const Number auto& value) { raw(&value, sizeof value); }
   void text(const std::string& value) {
     number(static_cast<std::uint32_t>(value.size()));
     raw(value.data(), value.size());
@@ -41,10 +42,11 @@ class ByteWriter {
     if constexpr (Derived::RowsAtCompileTime == Eigen::Dynamic) number(static_cast<std::uint32_t>(value.rows()));
     raw(value.data(), sizeof(typename Derived::Scalar) * static_cast<std::size_t>(value.size()));
   }
-  template <class Value>
-  void list(const std::vector<Value>& values) {
+  /// A vector or a deque.
+  template <class List>
+  void list(const List& values) {
     number(static_cast<std::uint32_t>(values.size()));
-    for (const Value& value : values) transfer(*this, value);
+    for (const auto& value : values) transfer(*this, value);
   }
   template <class Value>
   void maybe(const std::optional<Value>& value) {
@@ -70,10 +72,8 @@ class ByteReader {
   [[nodiscard]] bool failed() const { return failed_; }
   [[nodiscard]] bool at_end() const { return bytes_.empty(); }
 
-  template <class Number>
-    requires std::is_arithmetic_v<Number> || std::is_enum_v<Number>
-  void number(Number& value) {
-    if constexpr (std::same_as<Number, bool>) {
+  void number(Number auto& value) {
+    if constexpr (std::same_as<decltype(value), bool&>) {
       std::uint8_t byte = 0;
       raw(&byte, sizeof byte);
       if (byte > 1) failed_ = true;
@@ -95,8 +95,8 @@ class ByteReader {
     }
     raw(value.data(), kScalar * static_cast<std::size_t>(value.size()));
   }
-  template <class Value>
-  void list(std::vector<Value>& values) {
+  template <class List>
+  void list(List& values) {
     const std::size_t size = count(1);
     values.clear();
     for (std::size_t i = 0; i < size && !failed_; ++i) transfer(*this, values.emplace_back());
