@@ -38,7 +38,7 @@ struct BackendConfig {
   double stationary_velocity = 0.02;
 
   // Loops.
-  double cloud_voxel_m = 0.2;
+  double cloud_voxel_m = 0.15;
   bool use_loop_closing = true;
   int loop_min_spacing = 2;
   int loop_max_candidates = 3;

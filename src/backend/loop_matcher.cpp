@@ -21,6 +21,7 @@ constexpr double kConvergedRotation = 2e-4;    // [rad]
 constexpr double kKernelPerRadius = 0.2;       // width of the Cauchy kernel relative to the search radius
 constexpr double kAgreeingCosine = 0.87;       // 30 degrees between a point's own normal and the map's
 constexpr double kWallCosine = 0.5;            // a surface whose normal is at least 60 degrees from the body's up
+constexpr int kFullSteps = 6;                  // at the last radius
 // An alignment is given up when, after so many iterations at the last radius, it is as far from passing as this.
 constexpr int kIterationsUntilHopeless = 4;
 constexpr double kHopelessFraction = 0.6;    // of what must be matched
@@ -104,6 +105,10 @@ ObservedPart observed_part(const NormalEquations& equations, double length_m, do
   return part;
 }
 
+/// Points that cross from one voxel to another and back can keep an alignment swinging; steps that shrink as 1/n end
+/// it.
+double step_share(int at_last_radius) { return 1.0 / std::max(1, at_last_radius - kFullSteps); }
+
 double rms_range(std::span<const SurfacePoint> points) {
   double sum = 0.0;
   for (const SurfacePoint& point : points) sum += point.position.squaredNorm();
@@ -113,7 +118,7 @@ double rms_range(std::span<const SurfacePoint> points) {
 PlaneGates gates_of(const LoopMatcherConfig& config) { return {config.plane_thickness_m, config.plane_min_points}; }
 
 PlaneMap surfaces_of(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config) {
-  const PlacedCloud in_place{cloud, Pose()};
+  const CloudInMap in_place{cloud, Pose()};
   return {std::span(&in_place, 1), config.voxel_m, gates_of(config)};
 }
 
@@ -226,7 +231,7 @@ LoopSource::LoopSource(std::span<const CloudPoint> cloud, const LoopMatcherConfi
       points(surface_points(surfaces)),
       view(cloud, config.view_cell_deg * std::numbers::pi / 180.0) {}
 
-LoopMatch match_loop(LoopSource& source, std::span<const PlacedCloud> map_clouds, const Pose& T_map_source_predicted,
+LoopMatch match_loop(LoopSource& source, std::span<const CloudInMap> map_clouds, const Pose& T_map_source_predicted,
                      const LoopMatcherConfig& config, const LoopGates& gates) {
   LoopMatch match;
   match.T_map_source = T_map_source_predicted;
@@ -238,22 +243,25 @@ LoopMatch match_loop(LoopSource& source, std::span<const PlacedCloud> map_clouds
   const double coarse_voxel_m = kCoarseVoxelPerRadius * config.first_radius_m;
   PlaneMap coarse = map.coarser(coarse_voxel_m);
   const double length = rms_range(source.points);
-  const std::size_t stride = std::max<std::size_t>(1, source.points.size() / static_cast<std::size_t>(config.align_points));
+  const std::size_t stride =
+      std::max<std::size_t>(1, source.points.size() / static_cast<std::size_t>(config.align_points));
 
   bool converged = false;
   double radius = config.first_radius_m;
   int at_last_radius = 0;
   while (!converged && match.iterations < config.max_iterations) {
     const bool far_off = radius > config.last_radius_m && radius >= coarse_voxel_m;
-    const NormalEquations equations = accumulate(source.points, stride, far_off ? coarse : map, match.T_map_source, radius);
+    const NormalEquations equations =
+        accumulate(source.points, stride, far_off ? coarse : map, match.T_map_source, radius);
     const ObservedPart part = observed_part(equations, length, config.degenerate_ratio);
     ++match.iterations;
     if (part.directions == 0) break;
-    match.T_map_source = perturbed_in_body(match.T_map_source, part.step);
-    note_agreement(match, equations, T_map_source_predicted);
     if (radius <= config.last_radius_m) ++at_last_radius;
-    converged = at_last_radius > 0 && part.step.head<3>().norm() < kConvergedRotation &&
-                part.step.tail<3>().norm() < kConvergedPosition;
+    const Vector6d step = step_share(at_last_radius) * part.step;
+    match.T_map_source = perturbed_in_body(match.T_map_source, step);
+    note_agreement(match, equations, T_map_source_predicted);
+    converged =
+        at_last_radius > 0 && step.head<3>().norm() < kConvergedRotation && step.tail<3>().norm() < kConvergedPosition;
     if (at_last_radius >= kIterationsUntilHopeless && hopeless(match, config, gates)) break;
     radius = std::max(config.last_radius_m, kRadiusShrink * radius);
   }

@@ -21,7 +21,7 @@ struct LoopMatcherConfig {
   int max_iterations = 40;
   int neighbours = 2;               ///< keyframes on either side of the candidate that enter its local map
   int align_points = 1500;          ///< of the keyframe that looks, about so many are aligned; all are counted
-  double voxel_m = 0.35;            ///< a plane is fitted to 3 x 3 x 3 of them; one point of each is aligned
+  double voxel_m = 0.25;            ///< a plane is fitted to 3 x 3 x 3 of them; one point of each is aligned
   double first_radius_m = 2.0;      ///< search radius of the first iteration
   double last_radius_m = 0.5;       ///< search radius at the end; a matched point has a plane within it
   double plane_thickness_m = 0.08;  ///< largest standard deviation across a plane
@@ -103,7 +103,7 @@ struct LoopMatch {
 /// own surroundings, where those are planar. The overlap asks the other way round, so that a
 /// bare corner that fits into any room is not enough: of the map's surfaces that lie in the view of the source and are
 /// not hidden from it, how many lie on planes of the source?
-[[nodiscard]] LoopMatch match_loop(LoopSource& source, std::span<const PlacedCloud> map_clouds,
+[[nodiscard]] LoopMatch match_loop(LoopSource& source, std::span<const CloudInMap> map_clouds,
                                    const Pose& T_map_source_predicted, const LoopMatcherConfig& config,
                                    const LoopGates& gates);
 

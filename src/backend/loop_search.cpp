@@ -13,11 +13,11 @@ namespace ignis {
 namespace {
 
 /// Clouds of the candidate and its neighbours in the candidate's frame. Never reaches the keyframe that looks.
-std::vector<PlacedCloud> local_map(std::size_t candidate, std::size_t neighbours, const SmootherState& state) {
+std::vector<CloudInMap> local_map(std::size_t candidate, std::size_t neighbours, const SmootherState& state) {
   const std::size_t first = candidate > neighbours ? candidate - neighbours : 0;
   const std::size_t last = std::min(candidate + neighbours, state.poses.size() - 2);
   const Pose T_candidate_map = state.poses[candidate].T_map_body.inverse();
-  std::vector<PlacedCloud> clouds;
+  std::vector<CloudInMap> clouds;
   for (std::size_t i = first; i <= last; ++i) {
     clouds.push_back({state.clouds[i], T_candidate_map * state.poses[i].T_map_body});
   }

@@ -50,9 +50,9 @@ std::vector<CloudPoint> one_per_voxel(std::span<const CloudPoint> cloud, double 
 PlaneMap::PlaneMap(double voxel_m, int fit_reach, const PlaneGates& gates)
     : voxel_m_(voxel_m), fit_reach_(fit_reach), gates_(gates) {}
 
-PlaneMap::PlaneMap(std::span<const PlacedCloud> clouds, double voxel_m, const PlaneGates& gates)
+PlaneMap::PlaneMap(std::span<const CloudInMap> clouds, double voxel_m, const PlaneGates& gates)
     : PlaneMap(voxel_m, 1, gates) {
-  for (const PlacedCloud& cloud : clouds) {
+  for (const CloudInMap& cloud : clouds) {
     const Eigen::Matrix3d R = cloud.T_map_cloud.rotation.toRotationMatrix();
     for (const CloudPoint& point : cloud.points) {
       if (!point.position.allFinite()) continue;
@@ -108,11 +108,17 @@ std::optional<std::size_t> PlaneMap::nearest_voxel(const Eigen::Vector3d& point,
 }
 
 void PlaneMap::fit(std::size_t voxel) {
-  Moments all;
-  for_each_around(contents_[voxel].cell, fit_reach_, [&](const Eigen::Vector3i& cell) {
-    if (const auto there = find(cell)) all += contents_[*there].moments;
-  });
+  const auto moments_within = [&](int reach) {
+    Moments sum;
+    for_each_around(contents_[voxel].cell, reach, [&](const Eigen::Vector3i& cell) {
+      if (const auto there = find(cell)) sum += contents_[*there].moments;
+    });
+    return sum;
+  };
   voxels_[voxel].fit = Fit::kNoPlane;
+  Moments all = moments_within(fit_reach_);
+  // In a thin cloud, or far away, the points of a plane lie farther apart.
+  if (all.count < gates_.min_points) all = moments_within(2 * fit_reach_);
   if (all.count < gates_.min_points) return;
   const Eigen::Vector3d mean = all.sum / all.count;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;

@@ -27,7 +27,7 @@ struct PlaneGates {
 };
 
 /// A cloud and where it stands in the frame of a map.
-struct PlacedCloud {
+struct CloudInMap {
   std::span<const CloudPoint> points;
   Pose T_map_cloud;
 };
@@ -38,7 +38,7 @@ struct PlacedCloud {
 class PlaneMap {
  public:
   /// Points that are not finite are left out. A plane is fitted to a voxel and its 26 neighbours together.
-  PlaneMap(std::span<const PlacedCloud> clouds, double voxel_m, const PlaneGates& gates);
+  PlaneMap(std::span<const CloudInMap> clouds, double voxel_m, const PlaneGates& gates);
 
   /// The same points in larger voxels, each of which has a plane of its own points alone.
   [[nodiscard]] PlaneMap coarser(double voxel_m) const;
@@ -95,7 +95,7 @@ class PlaneMap {
   int fit_reach_;  ///< voxels on either side that belong to the neighbourhood of a plane
   PlaneGates gates_;
   std::vector<Voxel> voxels_;
-  std::vector<Content> contents_;  ///< by voxel
+  std::vector<Content> contents_;                                   ///< by voxel
   boost::unordered_flat_map<std::uint64_t, std::uint32_t> places_;  ///< in voxels_, by key of the cell
 };
 
