@@ -5,8 +5,8 @@ r"""What a change of the back end does: one row per drive and variant. The keyfr
     ./ignis shell env PYTHONPATH=python python3 bench/graph_table.py DRIVE_FOLDER... --work FOLDER \
         [--variant NAME:section.key=value,...]
 
-A drive's folder holds drive.lcm and ground_truth.tum, as `./ignis evaluate` leaves them under inputs/. Columns: loops in
-the graph; those of them that are more than 0.5 m from the truth; recall, the share of keyframes that came back to a
+A drive's folder holds drive.lcm and ground_truth.tum, as `./ignis evaluate` leaves them under inputs/. Columns: loops
+in the graph; those of them that are more than 0.5 m from the truth; recall, the share of keyframes that came back to a
 place (4 m, 45 degrees, 10 keyframes apart) and are within 2 keyframes of a loop; root mean square error of the loops'
 position; error of the trajectory before and after; NEES of the newest pose per degree of freedom (position and
 attitude: an honest covariance gives 1); processor time of the back end in all, per second of drive, and per keyframe.
