@@ -37,7 +37,8 @@ struct CloudInMap {
 /// answers depend on the points alone, not on the order of the questions. Not for use by several threads.
 class PlaneMap {
  public:
-  /// Points that are not finite are left out. A plane is fitted to a voxel and its 26 neighbours together.
+  /// Points that are not finite are left out. A plane is fitted to a voxel and its 26 neighbours together;
+  /// where these hold too few points, to the 125 voxels around.
   PlaneMap(std::span<const CloudInMap> clouds, double voxel_m, const PlaneGates& gates);
 
   /// The same points in larger voxels, each of which has a plane of its own points alone.
