@@ -64,15 +64,16 @@ def wrong_loops(edges: list[tuple[int, int, np.ndarray]], truth: Poses) -> int:
     return wrong
 
 
-def revisits(truth: Poses) -> int:
+def revisiting(truth: Poses) -> np.ndarray:
     """Keyframes from which a loop could have been closed."""
     ahead = np.array([truth.matrices()[i][:3, 2] for i in range(len(truth))])
-    count = 0
+    found = []
     for i in range(INDEX_GAP, len(truth)):
         distance = np.linalg.norm((truth.position[: i - INDEX_GAP + 1] - truth.position[i])[:, [0, 2]], axis=1)
         aligned = ahead[: i - INDEX_GAP + 1] @ ahead[i] > np.cos(REVISIT_TURN)
-        count += bool(np.any((distance < REVISIT_M) & aligned))
-    return count
+        if np.any((distance < REVISIT_M) & aligned):
+            found.append(i)
+    return np.array(found, dtype=int)
 
 
 def rms(results: Path, name: str, truth: Trajectory) -> float:
@@ -100,7 +101,7 @@ def main() -> None:
         wrong_in_all += wrong
         withdrawn = json.loads((results / "report.json").read_text())["loops_withdrawn"]
         errors = [rms(results, name, truth) for name in ("eskf", "smoothed")]
-        counts = f"{wrong:7d} {len(edges):10d} {withdrawn:11d} {revisits(at_keyframes):10d}"
+        counts = f"{wrong:7d} {len(edges):10d} {withdrawn:11d} {len(revisiting(at_keyframes)):10d}"
         print(f"{seed:4d} {counts} {errors[0]:10.4f} {errors[1]:14.4f}", flush=True)
     print(f"wrong loops in all: {wrong_in_all}")
 

@@ -201,6 +201,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
   json["scans_by_reason"] = scans_by_reason(result);
   json["scans_with_unobserved_directions"] =
       std::ranges::count_if(result.scans, [](const ScanStats& scan) { return scan.degenerate_directions > 0; });
+  json["sessions"] = result.sessions;
   json["keyframes"] = result.smoother.keyframes;
   json["keyframes_without_imu"] = result.smoother.without_imu;
   json["loops_accepted"] = accepted;
@@ -328,8 +329,11 @@ std::string summary(const ReplaySource& source, const ReplayResult& result, cons
   for (const auto& [reason, count] : scans_by_reason(result)) {
     if (reason != ignis::text(ScanReason::kApplied)) text += std::format(", {} {}", count, reason);
   }
-  text += std::format("\ngraph:      {} keyframes, {} loops kept, {} withdrawn\n", result.smoother.keyframes,
+  text += std::format("\ngraph:      {} keyframes, {} loops kept, {} withdrawn", result.smoother.keyframes,
                       result.smoother.loops_kept, result.smoother.loops_withdrawn);
+  if (result.sessions > 1)
+    text += std::format("; of the last of {} sessions, which begin where the map is lost", result.sessions);
+  text += '\n';
   text +=
       std::format("time:       {:.2f} s, {:.1f} times real time; a scan takes {:.2f} ms (median), {:.2f} ms (p99)\n",
                   timing.wall_s, seconds / std::max(timing.wall_s, 1e-9), quantile(result.scan_times_ms, 0.5),

@@ -12,8 +12,10 @@ BackendConfig with_loops(BackendConfig config, bool use_loops) {
 }  // namespace
 
 ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops)
-    : lio_(config.frontend.filter),
-      smoother_(with_loops(config.backend, use_loops), config.frontend.loop_gates),
+    : backend_config_(with_loops(config.backend, use_loops)),
+      loop_gates_(config.frontend.loop_gates),
+      lio_(config.frontend.filter),
+      smoother_(backend_config_, loop_gates_),
       map_(config.map) {
   map_.draw_at_rebuild();  // finish() does; nobody looks before
 }
@@ -34,10 +36,22 @@ void ReplayPipeline::take(const ScanResult& scan, double milliseconds) {
   result_.scans.push_back(scan.stats);
   result_.scan_times_ms.push_back(milliseconds);
   if (!scan.has_state) return;
+  follow_session(scan.stats.session);
   result_.odometry.push_back({scan.state.utime, scan.state.T_odom_body});
   result_.states.push_back({scan.state, scan.covariance});
   if (scan.keyframe) take_keyframe(*scan.keyframe);
   map_timer_.time([&] { return map_.insert_scan(scan.cloud, scan.state.T_odom_body); });
+}
+
+void ReplayPipeline::follow_session(std::int32_t session) {
+  if (session == session_) return;
+  session_ = session;
+  ++result_.sessions;
+  settle_graph();
+  smoother_ = Smoother(backend_config_, loop_gates_);
+  map_.clear();
+  keyframes_.clear();
+  result_.loops.clear();
 }
 
 void ReplayPipeline::take_keyframe(const Keyframe& sent) {
@@ -72,17 +86,25 @@ void ReplayPipeline::rebuild_map() {
   });
 }
 
-ReplayResult ReplayPipeline::finish() {
+/// Places the poses of this session where its graph has them in the end.
+void ReplayPipeline::settle_graph() {
   result_.optimum = solve(smoother_.shadow_problem());
   correct_map(smoother_.adopt(result_.optimum));
-  rebuild_map();
   std::vector<KeyframeCorrection> corrections;
   for (const KeyframePose& pose : smoother_.all_poses()) {
     KeyframeCorrection& keyframe = keyframes_.at(pose.id);
     keyframe.T_map_body = pose.T_map_body;
     corrections.push_back(keyframe);
   }
-  result_.smoothed = corrected_trajectory(result_.odometry, corrections);
+  const auto placed = static_cast<std::ptrdiff_t>(result_.smoothed.size());
+  const Trajectory session(result_.odometry.begin() + placed, result_.odometry.end());
+  const Trajectory smoothed = corrected_trajectory(session, corrections);
+  result_.smoothed.insert(result_.smoothed.end(), smoothed.begin(), smoothed.end());
+}
+
+ReplayResult ReplayPipeline::finish() {
+  settle_graph();
+  rebuild_map();
   result_.graph = smoother_.pose_graph();
   result_.smoother = smoother_.stats();
   result_.start = lio_.status().text;

@@ -29,17 +29,19 @@ struct ReplayResult {
   std::vector<LoopResult> loops;
   Trajectory odometry;                 ///< one row per scan, frame odom
   std::vector<UncertainState> states;  ///< on the same stamps
-  Trajectory smoothed;                 ///< on the same stamps, frame map
+  Trajectory smoothed;                 ///< on the same stamps, frame map of each session
   PoseGraph graph;
   SmootherStats smoother;
   ShadowOptimum optimum;  ///< how far the incremental solution was from the batch optimum at the end
+  int sessions = 1;       ///< the front end's; all above but the trajectories is of the newest
   std::string start;      ///< what the front end says about its start
   std::int64_t imu_samples = 0;
   std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
 };
 
 /// All cores in one process. Keyframes pass through their message form, so that they carry the same rounding as on the
-/// bus and a replay equals the live run. Newest session only: a reset of the front end begins a new graph and map.
+/// bus and a replay equals the live run. When the front end begins a new session, so do graph and map, as in the
+/// processes: their numbers and files are of the newest session, the trajectories of all.
 class ReplayPipeline {
  public:
   ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops);
@@ -59,15 +61,20 @@ class ReplayPipeline {
 
  private:
   void take(const ScanResult& scan, double milliseconds);
+  void follow_session(std::int32_t session);
   void take_keyframe(const Keyframe& keyframe);
+  void settle_graph();
   void correct_map(const SmootherUpdate& update);
   void rebuild_map();
 
+  BackendConfig backend_config_;
+  LoopGates loop_gates_;
   Lio lio_;
   Smoother smoother_;
   LiveMap map_;
   messages::KeyframeAssembler assembler_;
   std::map<std::int32_t, KeyframeCorrection> keyframes_;
+  std::int32_t session_ = 0;
   ReplayResult result_;
   StageTimer frontend_timer_;
   StageTimer backend_timer_;

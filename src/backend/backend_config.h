@@ -38,6 +38,7 @@ struct BackendConfig {
   double stationary_velocity = 0.02;
 
   // Loops.
+  double cloud_voxel_m = 0.15;
   bool use_loop_closing = true;
   int loop_min_spacing = 2;
   int loop_max_candidates = 3;
@@ -81,6 +82,8 @@ struct BackendConfig {
     visit.number("loose_velocity", self.loose_velocity, {1e-3, 100.0}, "m/s", "the same, velocity");
     visit.number("stationary_velocity", self.stationary_velocity, {1e-4, 1.0}, "m/s",
                  "sigma of the zero velocity of a keyframe that stood still");
+    visit.number("cloud_voxel_m", self.cloud_voxel_m, {0.01, 2.0}, "m",
+                 "of a keyframe's cloud one point per voxel is kept, in memory and in the journal");
     visit.flag("use_loop_closing", self.use_loop_closing, "false: smoothing only");
     visit.integer("loop_min_spacing", self.loop_min_spacing, {1, 1000}, "keyframes",
                   "fewest keyframes from one accepted loop to the next search");

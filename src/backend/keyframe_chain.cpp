@@ -10,6 +10,7 @@
 #include "backend/information.h"
 #include "backend/keyframe_check.h"
 #include "backend/keyframe_factors.h"
+#include "backend/plane_map.h"
 
 namespace ignis {
 namespace {
@@ -102,7 +103,7 @@ SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& con
   state.expected_id = keyframe.id + 1;
   state.angular_rate = keyframe.state.angular_rate;
   state.nodes.push_back(std::move(node));
-  state.clouds.push_back(keyframe.cloud);
+  state.clouds.push_back(one_per_voxel(keyframe.cloud, config.cloud_voxel_m));
   return outcome;
 }
 

@@ -146,7 +146,7 @@ void enter_believed(const Hearing& hearing, const BackendConfig& config, Increme
       continue;
     }
     const GraphLoop copy = loop;
-    const LoopEntry entry = enter_graph(std::move(loop), solver, state);
+    const LoopEntry entry = enter_graph(std::move(loop), config, solver, state);
     if (!entry.entered) {
       events.push_back(copy);
       events.back().result.reason = LoopReason::kSolverRefused;

@@ -14,12 +14,14 @@
 namespace ignis {
 namespace {
 
-constexpr double kRadiusShrink = 0.8;        // per iteration
-constexpr double kConvergedPosition = 5e-4;  // [m] step below which the alignment stands
-constexpr double kConvergedRotation = 2e-4;  // [rad]
-constexpr double kKernelPerRadius = 0.2;     // width of the Cauchy kernel relative to the search radius
-constexpr double kAgreeingCosine = 0.87;     // 30 degrees between a point's own normal and the map's
-constexpr double kWallCosine = 0.5;          // a surface whose normal is at least 60 degrees from the body's up
+constexpr double kRadiusShrink = 0.8;          // per iteration
+constexpr double kCoarseVoxelPerRadius = 0.5;  // side of the large voxels relative to the first search radius
+constexpr double kConvergedPosition = 5e-4;    // [m] step below which the alignment stands
+constexpr double kConvergedRotation = 2e-4;    // [rad]
+constexpr double kKernelPerRadius = 0.2;       // width of the Cauchy kernel relative to the search radius
+constexpr double kAgreeingCosine = 0.87;       // 30 degrees between a point's own normal and the map's
+constexpr double kWallCosine = 0.5;            // a surface whose normal is at least 60 degrees from the body's up
+constexpr int kFullSteps = 6;                  // at the last radius
 // An alignment is given up when, after so many iterations at the last radius, it is as far from passing as this.
 constexpr int kIterationsUntilHopeless = 4;
 constexpr double kHopelessFraction = 0.6;    // of what must be matched
@@ -38,18 +40,25 @@ struct NormalEquations {
   double weighted_square = 0.0;  ///< sum of w r^2
   double weight = 0.0;           ///< sum of w
   double absolute = 0.0;         ///< sum of |r|
+  int points = 0;
+  int walls = 0;
   int matched = 0;
   int walls_matched = 0;
 };
 
-NormalEquations accumulate(std::span<const SurfacePoint> source, PlaneMap& map, const Pose& T_map_source,
-                           double radius_m) {
+/// Of every `stride`-th point.
+NormalEquations accumulate(std::span<const SurfacePoint> source, std::size_t stride, PlaneMap& map,
+                           const Pose& T_map_source, double radius_m) {
   const double kernel = kKernelPerRadius * radius_m;
-  const Eigen::Matrix3d R_source_map = T_map_source.rotation.conjugate().toRotationMatrix();
+  const Eigen::Matrix3d R_map_source = T_map_source.rotation.toRotationMatrix();
+  const Eigen::Matrix3d R_source_map = R_map_source.transpose();
   NormalEquations sum;
-  for (const SurfacePoint& point : source) {
+  for (std::size_t i = 0; i < source.size(); i += stride) {
+    const SurfacePoint& point = source[i];
     const Eigen::Vector3d& p_source = point.position;
-    const Eigen::Vector3d p_map = T_map_source * p_source;
+    const Eigen::Vector3d p_map = R_map_source * p_source + T_map_source.translation;
+    ++sum.points;
+    if (on_wall(point)) ++sum.walls;
     const std::optional<SurfacePlane> plane = map.nearest_plane(p_map, radius_m);
     if (!plane) continue;
     const double residual = plane->normal.dot(p_map - plane->centre);
@@ -96,40 +105,36 @@ ObservedPart observed_part(const NormalEquations& equations, double length_m, do
   return part;
 }
 
+/// Points that cross from one voxel to another and back can keep an alignment swinging; steps that shrink as 1/n end
+/// it.
+double step_share(int at_last_radius) { return 1.0 / std::max(1, at_last_radius - kFullSteps); }
+
 double rms_range(std::span<const SurfacePoint> points) {
   double sum = 0.0;
   for (const SurfacePoint& point : points) sum += point.position.squaredNorm();
   return std::max(0.1, std::sqrt(sum / static_cast<double>(points.size())));
 }
 
-std::vector<Eigen::Vector3d> finite_points(std::span<const CloudPoint> cloud) {
-  std::vector<Eigen::Vector3d> points;
-  points.reserve(cloud.size());
-  for (const CloudPoint& point : cloud) {
-    if (point.position.allFinite()) points.push_back(point.position.cast<double>());
-  }
-  return points;
+PlaneGates gates_of(const LoopMatcherConfig& config) { return {config.plane_thickness_m, config.plane_min_points}; }
+
+PlaneMap surfaces_of(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config) {
+  const CloudInMap in_place{cloud, Pose()};
+  return {std::span(&in_place, 1), config.voxel_m, gates_of(config)};
 }
 
-PlaneGates gates_of(const LoopMatcherConfig& config) {
-  return {config.plane_radius_m, config.plane_thickness_m, config.plane_min_points};
-}
-
-/// One point per source voxel of `points`, with the direction of its surface in `surfaces`.
-std::vector<SurfacePoint> surface_points(std::span<const Eigen::Vector3d> points, PlaneMap& surfaces,
-                                         const LoopMatcherConfig& config) {
+/// The first point of each voxel, with the direction of its surface.
+std::vector<SurfacePoint> surface_points(PlaneMap& surfaces) {
   std::vector<SurfacePoint> found;
-  for (const Eigen::Vector3d& point : one_per_voxel(points, config.source_voxel_m)) {
-    const auto plane = surfaces.nearest_plane(point, config.plane_radius_m);
-    found.push_back({point, plane ? std::optional(plane->normal) : std::nullopt});
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const auto plane = surfaces.plane(i);
+    found.push_back({surfaces.first_point(i), plane ? std::optional(plane->normal) : std::nullopt});
   }
   return found;
 }
 
 /// Of the map's upright surfaces that the source would show, the fraction that it shows; of all surfaces where none is
 /// upright, for a floor lies under any place. Nothing to show counts as nothing shown.
-double overlap(LoopSource& source, std::span<const Eigen::Vector3d> map_points, PlaneMap& map, const Pose& T_map_source,
-               const LoopMatcherConfig& config) {
+double overlap(LoopSource& source, PlaneMap& map, const Pose& T_map_source, const LoopMatcherConfig& config) {
   struct Count {
     int would_show = 0;
     int shown = 0;
@@ -137,15 +142,15 @@ double overlap(LoopSource& source, std::span<const Eigen::Vector3d> map_points, 
   Count all;
   Count upright;
   const Pose T_source_map = T_map_source.inverse();
-  for (const Eigen::Vector3d& p_map : one_per_voxel(map_points, config.source_voxel_m)) {
-    const Eigen::Vector3d p_source = T_source_map * p_map;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const Eigen::Vector3d p_source = T_source_map * map.first_point(i);
     if (!source.view.would_show(p_source, config.last_radius_m)) continue;
-    const auto map_plane = map.nearest_plane(p_map, config.plane_radius_m);
+    const auto map_plane = map.plane(i);
     if (!map_plane) continue;
     const SurfacePoint surface{p_source, T_source_map.rotation * map_plane->normal};
     const auto plane = source.surfaces.nearest_plane(p_source, config.last_radius_m);
     // Too few points for a plane say neither yes nor no.
-    if (!plane && source.surfaces.has_point_near(p_source, config.last_radius_m)) continue;
+    if (!plane && source.surfaces.has_points_near(p_source, config.last_radius_m)) continue;
     const bool shown = plane && agree(surface, plane->normal);
     for (Count* count : {&all, &upright}) {
       if (count == &upright && !on_wall(surface)) continue;
@@ -158,10 +163,10 @@ double overlap(LoopSource& source, std::span<const Eigen::Vector3d> map_points, 
 }
 
 /// How much of the source has found its like, and how far the alignment has moved it.
-void note_agreement(LoopMatch& match, const NormalEquations& sum, const LoopSource& source, const Pose& T_predicted) {
-  match.matched_fraction = static_cast<double>(sum.matched) / static_cast<double>(source.points.size());
+void note_agreement(LoopMatch& match, const NormalEquations& sum, const Pose& T_predicted) {
+  match.matched_fraction = static_cast<double>(sum.matched) / sum.points;
   // Without upright surfaces nothing was asked of them; the count of directions then decides.
-  match.wall_fraction = source.walls > 0 ? static_cast<double>(sum.walls_matched) / source.walls : 1.0;
+  match.wall_fraction = sum.walls > 0 ? static_cast<double>(sum.walls_matched) / sum.walls : 1.0;
   match.mean_residual = sum.matched > 0 ? sum.absolute / sum.matched : 0.0;
   const Vector6d correction = body_difference(T_predicted, match.T_map_source);
   match.correction_rad = correction.head<3>().norm();
@@ -222,50 +227,53 @@ void LoopMatcherConfig::check(config::Offences& offences, const std::string& pat
 }
 
 LoopSource::LoopSource(std::span<const CloudPoint> cloud, const LoopMatcherConfig& config)
-    : LoopSource(finite_points(cloud), config) {}
-
-LoopSource::LoopSource(const std::vector<Eigen::Vector3d>& cloud, const LoopMatcherConfig& config)
-    : surfaces(cloud, config.map_voxel_m, gates_of(config)),
-      points(surface_points(cloud, surfaces, config)),
-      walls(static_cast<int>(std::ranges::count_if(points, on_wall))),
+    : surfaces(surfaces_of(cloud, config)),
+      points(surface_points(surfaces)),
       view(cloud, config.view_cell_deg * std::numbers::pi / 180.0) {}
 
-LoopMatch match_loop(LoopSource& source, std::span<const Eigen::Vector3d> map_points,
-                     const Pose& T_map_source_predicted, const LoopMatcherConfig& config, const LoopGates& gates) {
+LoopMatch match_loop(LoopSource& source, std::span<const CloudInMap> map_clouds, const Pose& T_map_source_predicted,
+                     const LoopMatcherConfig& config, const LoopGates& gates) {
   LoopMatch match;
   match.T_map_source = T_map_source_predicted;
-  if (source.points.empty() || map_points.empty()) {
+  PlaneMap map(map_clouds, config.voxel_m, gates_of(config));
+  if (source.points.empty() || map.size() == 0) {
     match.reason_text = source.points.empty() ? "the keyframe has no points" : "the candidate has no points";
     return match;
   }
-  PlaneMap map(map_points, config.map_voxel_m, gates_of(config));
+  const double coarse_voxel_m = kCoarseVoxelPerRadius * config.first_radius_m;
+  PlaneMap coarse = map.coarser(coarse_voxel_m);
   const double length = rms_range(source.points);
+  const std::size_t stride =
+      std::max<std::size_t>(1, source.points.size() / static_cast<std::size_t>(config.align_points));
 
   bool converged = false;
   double radius = config.first_radius_m;
   int at_last_radius = 0;
   while (!converged && match.iterations < config.max_iterations) {
-    const NormalEquations equations = accumulate(source.points, map, match.T_map_source, radius);
+    const bool far_off = radius > config.last_radius_m && radius >= coarse_voxel_m;
+    const NormalEquations equations =
+        accumulate(source.points, stride, far_off ? coarse : map, match.T_map_source, radius);
     const ObservedPart part = observed_part(equations, length, config.degenerate_ratio);
     ++match.iterations;
     if (part.directions == 0) break;
-    match.T_map_source = perturbed_in_body(match.T_map_source, part.step);
-    note_agreement(match, equations, source, T_map_source_predicted);
     if (radius <= config.last_radius_m) ++at_last_radius;
-    converged = at_last_radius > 0 && part.step.head<3>().norm() < kConvergedRotation &&
-                part.step.tail<3>().norm() < kConvergedPosition;
+    const Vector6d step = step_share(at_last_radius) * part.step;
+    match.T_map_source = perturbed_in_body(match.T_map_source, step);
+    note_agreement(match, equations, T_map_source_predicted);
+    converged =
+        at_last_radius > 0 && step.head<3>().norm() < kConvergedRotation && step.tail<3>().norm() < kConvergedPosition;
     if (at_last_radius >= kIterationsUntilHopeless && hopeless(match, config, gates)) break;
     radius = std::max(config.last_radius_m, kRadiusShrink * radius);
   }
 
-  const NormalEquations final_sum = accumulate(source.points, map, match.T_map_source, config.last_radius_m);
+  const NormalEquations final_sum = accumulate(source.points, 1, map, match.T_map_source, config.last_radius_m);
   const ObservedPart part = observed_part(final_sum, length, config.degenerate_ratio);
   match.directions = part.directions;
-  note_agreement(match, final_sum, source, T_map_source_predicted);
+  note_agreement(match, final_sum, T_map_source_predicted);
   const bool enough_matched =
       match.matched_fraction >= gates.loop_match_min_frac && match.wall_fraction >= config.min_wall_fraction;
   // The other way round costs as much again; most candidates have failed by now.
-  if (enough_matched) match.overlap = overlap(source, map_points, map, match.T_map_source, config);
+  if (enough_matched) match.overlap = overlap(source, map, match.T_map_source, config);
   const double floor = config.noise_floor_m * config.noise_floor_m;
   const double variance =
       final_sum.weight > 0.0 ? std::max(floor, final_sum.weighted_square / final_sum.weight) : floor;

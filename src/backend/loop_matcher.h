@@ -20,11 +20,10 @@ namespace ignis {
 struct LoopMatcherConfig {
   int max_iterations = 40;
   int neighbours = 2;               ///< keyframes on either side of the candidate that enter its local map
-  double map_voxel_m = 0.1;         ///< one point per voxel of the local map
-  double source_voxel_m = 0.3;      ///< one point per voxel of the keyframe that looks
+  int align_points = 1500;          ///< of the keyframe that looks, about so many are aligned; all are counted
+  double voxel_m = 0.25;            ///< a plane is fitted to 3 x 3 x 3 of them; one point of each is aligned
   double first_radius_m = 2.0;      ///< search radius of the first iteration
   double last_radius_m = 0.5;       ///< search radius at the end; a matched point has a plane within it
-  double plane_radius_m = 0.6;      ///< neighbourhood that a plane is fitted to
   double plane_thickness_m = 0.08;  ///< largest standard deviation across a plane
   int plane_min_points = 6;         ///< fewest points of a plane
   double degenerate_ratio = 0.01;   ///< a direction below this share of the matched points' weight is left free
@@ -38,11 +37,12 @@ struct LoopMatcherConfig {
     visit.integer("max_iterations", self.max_iterations, {1, 500}, "1", "iterations of the alignment at most");
     visit.integer("neighbours", self.neighbours, {0, 20}, "keyframes",
                   "keyframes on either side of the candidate in its local map");
-    visit.number("map_voxel_m", self.map_voxel_m, {0.01, 2.0}, "m", "one point of the local map per voxel");
-    visit.number("source_voxel_m", self.source_voxel_m, {0.01, 2.0}, "m", "one point of the current cloud per voxel");
+    visit.integer("align_points", self.align_points, {50, 1000000}, "points",
+                  "of the keyframe that looks, about so many are aligned; the result is judged by all");
+    visit.number("voxel_m", self.voxel_m, {0.02, 2.0}, "m",
+                 "side of a voxel: a plane is fitted to 3 x 3 x 3 of them, and one point of each is aligned");
     visit.number("first_radius_m", self.first_radius_m, {0.05, 10.0}, "m", "search radius of the first iteration");
     visit.number("last_radius_m", self.last_radius_m, {0.05, 10.0}, "m", "search radius of the last iterations");
-    visit.number("plane_radius_m", self.plane_radius_m, {0.05, 5.0}, "m", "neighbourhood that a plane is fitted to");
     visit.number("plane_thickness_m", self.plane_thickness_m, {0.001, 1.0}, "m",
                  "largest standard deviation across a plane");
     visit.integer("plane_min_points", self.plane_min_points, {3, 1000}, "points", "fewest points of a plane");
@@ -72,11 +72,7 @@ struct LoopSource {
 
   PlaneMap surfaces;                 ///< of the whole cloud
   std::vector<SurfacePoint> points;  ///< one per voxel of it, to be aligned
-  int walls;                         ///< of the points, those on upright surfaces
   ViewGrid view;
-
- private:
-  LoopSource(const std::vector<Eigen::Vector3d>& cloud, const LoopMatcherConfig& config);
 };
 
 /// What the match found. The pose and the figures are filled for a refused match too.
@@ -98,16 +94,16 @@ struct LoopMatch {
   [[nodiscard]] bool verified() const { return reason == LoopReason::kAccepted; }
 };
 
-/// Aligns `source` with the local map `map_points` (any frame) by point-to-plane
-/// Gauss-Newton with a search radius that narrows and Cauchy weights, beginning at `T_map_source` predicted; then
-/// applies the gates. Directions in which the geometry says nothing keep the prediction and get no information (J.
+/// Aligns `source` with the local map `map_clouds` (any frame) by point-to-plane Gauss-Newton with Cauchy weights and a
+/// search radius that narrows, first among large voxels, then among small ones; beginning at `T_map_source` predicted.
+/// Then applies the gates. Directions in which the geometry says nothing keep the prediction and get no information (J.
 /// Zhang, M. Kaess, S. Singh, "On degeneracy of optimization-based state estimation problems", ICRA 2016).
 ///
-/// A point counts as matched when the nearest map point within the search radius lies on a plane whose direction agrees
-/// with that of the point's own surroundings, where those are planar. The overlap asks the other way round, so that a
+/// A point counts as matched when the map has a plane there (PlaneMap) whose direction agrees with that of the point's
+/// own surroundings, where those are planar. The overlap asks the other way round, so that a
 /// bare corner that fits into any room is not enough: of the map's surfaces that lie in the view of the source and are
 /// not hidden from it, how many lie on planes of the source?
-[[nodiscard]] LoopMatch match_loop(LoopSource& source, std::span<const Eigen::Vector3d> map_points,
+[[nodiscard]] LoopMatch match_loop(LoopSource& source, std::span<const CloudInMap> map_clouds,
                                    const Pose& T_map_source_predicted, const LoopMatcherConfig& config,
                                    const LoopGates& gates);
 

@@ -13,20 +13,15 @@ namespace ignis {
 namespace {
 
 /// Clouds of the candidate and its neighbours in the candidate's frame. Never reaches the keyframe that looks.
-std::vector<Eigen::Vector3d> local_map(std::size_t candidate, std::size_t neighbours,
-                                       std::span<const KeyframePose> poses,
-                                       std::span<const std::vector<CloudPoint>> clouds) {
+std::vector<CloudInMap> local_map(std::size_t candidate, std::size_t neighbours, const SmootherState& state) {
   const std::size_t first = candidate > neighbours ? candidate - neighbours : 0;
-  const std::size_t last = std::min(candidate + neighbours, poses.size() - 2);
-  const Pose T_candidate_map = poses[candidate].T_map_body.inverse();
-  std::vector<Eigen::Vector3d> points;
+  const std::size_t last = std::min(candidate + neighbours, state.poses.size() - 2);
+  const Pose T_candidate_map = state.poses[candidate].T_map_body.inverse();
+  std::vector<CloudInMap> clouds;
   for (std::size_t i = first; i <= last; ++i) {
-    const Pose T_candidate_body = T_candidate_map * poses[i].T_map_body;
-    for (const CloudPoint& point : clouds[i]) {
-      if (point.position.allFinite()) points.push_back(T_candidate_body * point.position.cast<double>());
-    }
+    clouds.push_back({state.clouds[i], T_candidate_map * state.poses[i].T_map_body});
   }
-  return points;
+  return clouds;
 }
 
 bool is_better(const LoopMatch& match, const LoopMatch& best) {
@@ -87,13 +82,14 @@ LoopProposal best_match(const std::vector<std::size_t>& chosen, const SmootherSt
   LoopMatch best;
   for (const std::size_t i : chosen) {
     const Pose T_candidate_current = state.poses[i].T_map_body.inverse() * current.T_map_body;
-    const LoopMatch match = match_loop(source, local_map(i, neighbours, state.poses, state.clouds), T_candidate_current,
-                                       config.matcher, gates);
+    const LoopMatch match =
+        match_loop(source, local_map(i, neighbours, state), T_candidate_current, config.matcher, gates);
     if (match.verified()) ++proposal.result.passed;
     if (i != chosen.front() && !is_better(match, best)) continue;
     best = match;
     fill(proposal.result, match, state.poses[i].id);
     proposal.rows = loop_noise(match, config);
+    if (match.verified()) break;
   }
   proposal.result.from_id = current.id;
   return proposal;

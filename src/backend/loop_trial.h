@@ -20,7 +20,8 @@ struct LoopEntry {
 };
 
 /// Moves `loop` into the graph, on trial. A refused one is gone.
-[[nodiscard]] LoopEntry enter_graph(GraphLoop loop, IncrementalSolver& solver, SmootherState& state);
+[[nodiscard]] LoopEntry enter_graph(GraphLoop loop, const BackendConfig& config, IncrementalSolver& solver,
+                                    SmootherState& state);
 
 /// Takes the loop at `index` out of the graph and hands it back with `reason_text`, stage kWithdrawn.
 GraphLoop leave_graph(std::size_t index, const std::string& reason_text, IncrementalSolver& solver,

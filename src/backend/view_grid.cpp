@@ -8,13 +8,15 @@
 
 namespace ignis {
 
-ViewGrid::ViewGrid(std::span<const Eigen::Vector3d> points, double cell_rad)
+ViewGrid::ViewGrid(std::span<const CloudPoint> cloud, double cell_rad)
     : columns_(static_cast<std::size_t>(std::ceil(2.0 * std::numbers::pi / cell_rad))),
       rows_(static_cast<std::size_t>(std::ceil(std::numbers::pi / cell_rad))),
       nearest_(columns_ * rows_, std::numeric_limits<double>::infinity()) {
-  for (const Eigen::Vector3d& point : points) {
-    double& nearest = nearest_[cell_of(point)];
-    nearest = std::min(nearest, point.norm());
+  for (const CloudPoint& point : cloud) {
+    if (!point.position.allFinite()) continue;
+    const Eigen::Vector3d p_body = point.position.cast<double>();
+    double& nearest = nearest_[cell_of(p_body)];
+    nearest = std::min(nearest, p_body.norm());
   }
 }
 

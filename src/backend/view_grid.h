@@ -6,14 +6,16 @@
 
 #include <Eigen/Core>
 
+#include "common/measurements.h"
+
 namespace ignis {
 
 /// Which way a cloud looks and how far: the nearest point of each cell of a grid of directions around the body's
 /// origin. What lies in front of that point would have been seen; what lies behind it is hidden.
 class ViewGrid {
  public:
-  /// `points` in body axes; `cell_rad` is the side of a cell.
-  ViewGrid(std::span<const Eigen::Vector3d> points, double cell_rad);
+  /// `cloud` in body axes; points that are not finite are left out; `cell_rad` is the side of a cell.
+  ViewGrid(std::span<const CloudPoint> cloud, double cell_rad);
 
   /// A surface at `p_body` would have been seen: its direction was looked at, and nothing nearer than it by more than
   /// `margin_m` stands in the way.

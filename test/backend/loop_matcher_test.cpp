@@ -12,26 +12,21 @@
 namespace ignis {
 namespace {
 
-LoopMatch match_cloud(const std::vector<CloudPoint>& cloud, const std::vector<Eigen::Vector3d>& map, const Pose& guess,
+LoopMatch match_cloud(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& map, const Pose& guess,
                       const LoopMatcherConfig& config, const LoopGates& gates) {
   LoopSource source(cloud, config);
-  return match_loop(source, map, guess, config, gates);
+  const CloudInMap placed{map, Pose()};
+  return match_loop(source, std::span(&placed, 1), guess, config, gates);
 }
 
 using testing::hall_cloud;
-
-std::vector<Eigen::Vector3d> positions(const std::vector<CloudPoint>& cloud) {
-  std::vector<Eigen::Vector3d> points;
-  for (const CloudPoint& point : cloud) points.push_back(point.position.cast<double>());
-  return points;
-}
 
 /// Two views of the hall half a metre apart.
 struct TwoViews {
   Pose T_world_a{so3::exp({0.0, 0.3, 0.0}), {-1.0, 0.0, -2.0}};
   Pose T_world_b{so3::exp({0.0, 0.5, 0.0}), {-1.3, 0.0, -2.4}};
   Pose T_a_b = T_world_a.inverse() * T_world_b;
-  std::vector<Eigen::Vector3d> map = positions(hall_cloud(T_world_a, 8000, 1));
+  std::vector<CloudPoint> map = hall_cloud(T_world_a, 8000, 1);
   std::vector<CloudPoint> source = hall_cloud(T_world_b, 4000, 2);
 };
 
@@ -64,7 +59,7 @@ TEST(LoopMatcher, ClaimsAnInformationThatItsErrorsBear) {
   constexpr int kRuns = 12;
   for (unsigned run = 0; run < kRuns; ++run) {
     TwoViews views;
-    views.map = positions(hall_cloud(views.T_world_a, 8000, 100 + run));
+    views.map = hall_cloud(views.T_world_a, 8000, 100 + run);
     views.source = hall_cloud(views.T_world_b, 4000, 200 + run);
     const LoopMatch match = match_cloud(views.source, views.map, views.T_a_b, LoopMatcherConfig(), LoopGates());
     ASSERT_TRUE(match.verified()) << match.reason_text;
@@ -160,17 +155,18 @@ std::vector<CloudPoint> cloud_of(const std::vector<Eigen::Vector3d>& points) {
 TEST(LoopMatcher, SeesThatTheCandidateHasWallsWhichAreNotHere) {
   // An empty room fits wholly into a room of the same size with partitions; only the other way round they differ.
   const std::vector<CloudPoint> empty = cloud_of(room(false));
-  const LoopMatch same = match_cloud(empty, room(false), Pose(), LoopMatcherConfig(), LoopGates());
+  const LoopMatch same = match_cloud(empty, empty, Pose(), LoopMatcherConfig(), LoopGates());
   EXPECT_TRUE(same.verified()) << same.reason_text;
   EXPECT_GT(same.overlap, 0.95);
-  const LoopMatch other = match_cloud(empty, room(true), Pose(), LoopMatcherConfig(), LoopGates());
+  const LoopMatch other = match_cloud(empty, cloud_of(room(true)), Pose(), LoopMatcherConfig(), LoopGates());
   EXPECT_GT(other.matched_fraction, 0.7);
   EXPECT_GT(other.wall_fraction, 0.7);
   EXPECT_LT(other.overlap, 0.8);
   LoopMatcherConfig strict;
   strict.min_overlap = 0.85;
-  EXPECT_EQ(match_cloud(empty, room(true), Pose(), strict, LoopGates()).reason, LoopReason::kTooLittleOverlap);
-  EXPECT_TRUE(match_cloud(empty, room(false), Pose(), strict, LoopGates()).verified());
+  EXPECT_EQ(match_cloud(empty, cloud_of(room(true)), Pose(), strict, LoopGates()).reason,
+            LoopReason::kTooLittleOverlap);
+  EXPECT_TRUE(match_cloud(empty, empty, Pose(), strict, LoopGates()).verified());
 }
 
 TEST(LoopMatcher, DoesNotAskForWhatIsHidden) {
@@ -180,7 +176,7 @@ TEST(LoopMatcher, DoesNotAskForWhatIsHidden) {
   for (const Eigen::Vector3d& p : all) {
     if (std::abs(p.x()) < 4.1 && std::abs(p.z()) < 2.6) inside.push_back(p);
   }
-  EXPECT_GT(match_cloud(cloud_of(inside), all, Pose(), LoopMatcherConfig(), LoopGates()).overlap, 0.9);
+  EXPECT_GT(match_cloud(cloud_of(inside), cloud_of(all), Pose(), LoopMatcherConfig(), LoopGates()).overlap, 0.9);
 }
 
 TEST(LoopMatcher, LeavesTheDirectionOfACorridorFree) {
@@ -194,14 +190,13 @@ TEST(LoopMatcher, LeavesTheDirectionOfACorridorFree) {
     const Eigen::Vector3d faces[] = {{-1.5, 3.0 * s - 0.5, z}, {1.5, 3.0 * s - 0.5, z}, {3.0 * s - 1.5, -0.5, z}};
     corridor.push_back({faces[i % 3].cast<float>(), 0.0F});
   }
-  const std::vector<Eigen::Vector3d> map = positions(corridor);
   std::vector<CloudPoint> source;
   for (const CloudPoint& point : corridor) {
     if (std::abs(point.position.z()) < 8.0F) source.push_back(point);
   }
   Pose guess;
   guess.translation = {0.3, 0.1, 0.7};
-  const LoopMatch match = match_cloud(source, map, guess, LoopMatcherConfig(), LoopGates());
+  const LoopMatch match = match_cloud(source, corridor, guess, LoopMatcherConfig(), LoopGates());
   ASSERT_TRUE(match.verified()) << match.reason_text;
   EXPECT_EQ(match.directions, 5);
   EXPECT_NEAR(match.T_map_source.translation.x(), 0.0, 0.02);
@@ -217,8 +212,7 @@ TEST(LoopMatcher, SaysDegenerateWhenThereIsNothingButFloor) {
       floor.push_back({{0.2F * static_cast<float>(x), -0.5F, 0.2F * static_cast<float>(z)}, 0.0F});
     }
   }
-  EXPECT_EQ(match_cloud(floor, positions(floor), Pose(), LoopMatcherConfig(), LoopGates()).reason,
-            LoopReason::kDegenerate);
+  EXPECT_EQ(match_cloud(floor, floor, Pose(), LoopMatcherConfig(), LoopGates()).reason, LoopReason::kDegenerate);
 }
 
 TEST(LoopMatcher, RefusesEmptyAndNonFiniteClouds) {

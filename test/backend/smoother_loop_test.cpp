@@ -72,6 +72,35 @@ TEST(SmootherLoops, RemoveTheDriftOfTwoLaps) {
   }
 }
 
+TEST(SmootherLoops, KeepOnePointPerVoxelOfACloud) {
+  testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 2, .cloud_points = 500});
+  const auto journal_bytes = [&] {
+    Smoother smoother{BackendConfig(), LoopGates()};
+    for (const Keyframe& keyframe : drive.keyframes) static_cast<void>(smoother.add_keyframe(keyframe));
+    return smoother.take_change().size();
+  };
+  const std::size_t once = journal_bytes();
+  for (Keyframe& keyframe : drive.keyframes) {
+    const std::vector<CloudPoint> cloud = keyframe.cloud;
+    keyframe.cloud.insert(keyframe.cloud.end(), cloud.begin(), cloud.end());
+  }
+  EXPECT_EQ(journal_bytes(), once);
+}
+
+TEST(SmootherLoops, StopAtTheFirstCandidateThatTheMatchConfirms) {
+  // On the third lap there are two candidates side by side, either of which would do.
+  const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 55, .cloud_points = 3000});
+  std::vector<LoopResult> loops;
+  static_cast<void>(run(drive, BackendConfig(), &loops));
+  int with_a_choice = 0;
+  for (const LoopResult& loop : loops) {
+    if (loop.candidates < 2 || !loop.accepted()) continue;
+    EXPECT_EQ(loop.passed, 1);
+    if (loop.from_id - loop.to_id > 30) ++with_a_choice;
+  }
+  EXPECT_GE(with_a_choice, 1) << "the oldest goes first";
+}
+
 TEST(SmootherLoops, SayWhyThereIsNone) {
   const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 30, .cloud_points = 1500});
   std::vector<LoopResult> disabled;

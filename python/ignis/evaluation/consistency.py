@@ -37,10 +37,14 @@ def read_pose_covariances(file: Path) -> np.ndarray:
 
 
 def nees_of(folder: Path, truth: Trajectory) -> tuple[float, float]:
-    """Of position and attitude, per degree of freedom, mean over the scans of a replay's folder. The frame of reference
-    is level and has its origin and heading at the first pose, so the tilt of the start is an error."""
-    estimate = read_tum(folder / "eskf.tum")
-    covariance = read_pose_covariances(folder / "eskf_states.csv")
+    """Of the filter's poses, mean over the scans of a replay's folder."""
+    return nees(read_tum(folder / "eskf.tum"), read_pose_covariances(folder / "eskf_states.csv"), truth)
+
+
+def nees(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory) -> tuple[float, float]:
+    """Of position and attitude, per degree of freedom; covariances (n, 6, 6), attitude in body axes, then position in
+    those of the trajectory. The frame of reference is level and has its origin and heading at the first pose, so the
+    tilt of the start is an error."""
     pair = paired(estimate, truth)
     covariance = covariance[np.isin(estimate.utime, pair.estimate.utime)]
     true = _level_start(pair.truth.poses[:1]).inverse()[np.zeros(len(covariance), dtype=int)] @ pair.truth.poses

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// graph_drive: the back end alone over recorded keyframes (keyframe_log, or any log of a live run that holds
+// LIO_KEYFRAME), with the processor time of each. Prints one JSON object; with --out also trajectories, loops and
+// graph. Like the processes, it begins anew with each session: what it writes is of the newest.
+//
+//     build/release/bin/graph_drive KEYFRAMES.lcm --config config/ignis8_tuned.json --set backend.SECTION.KEY=VALUE
+
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "backend/smoother.h"
+#include "common/trajectory_file.h"
+#include "messages/keyframe_messages.h"
+#include "messages/lcm_log.h"
+#include "messages/length_check.h"
+#include "runtime/application.h"
+#include "runtime/channels.h"
+
+namespace {
+
+using namespace ignis;
+
+double processor_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+std::vector<Keyframe> read_keyframes(const std::filesystem::path& file) {
+  messages::LcmLog log(file);
+  messages::KeyframeAssembler assembler;
+  std::vector<Keyframe> keyframes;
+  while (const auto event = log.next()) {
+    keyframe_t part;
+    if (event->channel != runtime::channels::kKeyframe || !messages::decode_checked(event->data, part)) continue;
+    if (auto keyframe = assembler.add(part)) keyframes.push_back(std::move(*keyframe));
+  }
+  return keyframes;
+}
+
+/// The back end over one session's keyframes.
+class Drive {
+ public:
+  explicit Drive(const runtime::IgnisConfig& config) : smoother_(config.backend, config.frontend.loop_gates) {}
+
+  void add(const Keyframe& keyframe) {
+    const double began = processor_ms();
+    const SmootherUpdate update = smoother_.add_keyframe(keyframe);
+    times_ms_.push_back(processor_ms() - began);
+    odometry_.push_back({keyframe.state.utime, keyframe.state.T_odom_body});
+    if (!update.accepted()) return;
+    stamps_.push_back(keyframe.state.utime);
+    newest_.push_back(update);
+    if (update.loop) note(*update.loop);
+    for (const LoopResult& changed : update.changed) note(changed);
+  }
+
+  [[nodiscard]] nlohmann::ordered_json report() const {
+    const SmootherStats stats = smoother_.stats();
+    const double seconds = odometry_.empty() ? 0.0 : seconds_between(odometry_.front().utime, odometry_.back().utime);
+    double sum = 0.0;
+    for (const double ms : times_ms_) sum += ms;
+    return {{"keyframes", stats.keyframes},
+            {"drive_s", seconds},
+            {"loops", stats.loops_kept},
+            {"waiting", stats.loops_waiting},
+            {"withdrawn", stats.loops_withdrawn},
+            {"cpu_s", sum / 1e3},
+            {"cpu_ms_per_drive_s", sum / std::max(seconds, 1e-9)},
+            {"p50_ms", quantile(times_ms_, 0.5)},
+            {"p99_ms", quantile(times_ms_, 0.99)},
+            {"max_ms", quantile(times_ms_, 1.0)}};
+  }
+
+  void write(const std::filesystem::path& folder) const {
+    std::filesystem::create_directories(folder);
+    write_tum(folder / "eskf.tum", odometry_);
+    Trajectory smoothed;
+    for (std::size_t i = 0; i < stamps_.size(); ++i)
+      smoothed.push_back({stamps_[i], smoother_.all_poses()[i].T_map_body});
+    write_tum(folder / "smoothed.tum", smoothed);
+    write_pose_graph(folder / "keyframes.g2o", smoother_.pose_graph());
+    write_newest(folder / "newest.csv");
+    std::ofstream loops(folder / "loops.csv");
+    loops << "utime,from,to,stage,reason,candidates,passed,correction_m,mean_residual,matched,overlap,text\n";
+    for (const std::string& line : loop_lines_) loops << line << '\n';
+    std::ofstream times(folder / "times.csv");
+    times << "ms\n";
+    for (const double ms : times_ms_) times << ms << '\n';
+  }
+
+ private:
+  void note(const LoopResult& loop) {
+    loop_lines_.push_back(std::format("{},{},{},{},{},{},{},{:.4f},{:.4f},{:.3f},{:.3f},\"{}\"", loop.utime,
+                                      loop.from_id, loop.to_id, static_cast<int>(loop.stage), text(loop.reason),
+                                      loop.candidates, loop.passed, loop.correction_m, loop.mean_residual,
+                                      loop.matched_fraction, loop.overlap, loop.reason_text));
+  }
+
+  /// The newest pose after each keyframe and the covariance that was published with it: attitude then position, body
+  /// axes, upper triangle row by row.
+  void write_newest(const std::filesystem::path& file) const {
+    std::ofstream out(file);
+    out << "utime,x,y,z,qx,qy,qz,qw,covariance\n";
+    for (std::size_t i = 0; i < newest_.size(); ++i) {
+      const Pose& pose = newest_[i].newest.T_odom_body;
+      const Eigen::Vector3d& t = pose.translation;
+      const Eigen::Vector4d q = pose.rotation.coeffs();
+      out << std::format("{},{},{},{},{},{},{},{}", stamps_[i], t.x(), t.y(), t.z(), q(0), q(1), q(2), q(3));
+      for (int row = 0; row < 6; ++row) {
+        for (int column = row; column < 6; ++column) out << std::format(",{}", newest_[i].covariance(row, column));
+      }
+      out << '\n';
+    }
+  }
+
+  Smoother smoother_;
+  std::vector<double> times_ms_;
+  Trajectory odometry_;
+  std::vector<Utime> stamps_;
+  std::vector<SmootherUpdate> newest_;
+  std::vector<std::string> loop_lines_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string log;
+  std::string folder;
+  return runtime::run_application(
+      "graph_drive", "Runs the back end over recorded keyframes.", argc, argv,
+      [&](CLI::App& app) {
+        app.add_option("log", log, "LCM log with LIO_KEYFRAME")->required();
+        app.add_option("-o,--out", folder, "folder for trajectories, loops and graph");
+      },
+      [&](const runtime::Application& application) {
+        const std::vector<Keyframe> keyframes = read_keyframes(log);
+        if (keyframes.empty()) throw runtime::UserError(log + " holds no keyframe");
+        auto drive = std::make_unique<Drive>(application.config);
+        std::int32_t session = keyframes.front().session;
+        for (const Keyframe& keyframe : keyframes) {
+          if (keyframe.session != session) drive = std::make_unique<Drive>(application.config);
+          session = keyframe.session;
+          drive->add(keyframe);
+        }
+        if (!folder.empty()) drive->write(folder);
+        std::cout << drive->report().dump() << '\n';
+        return runtime::kDone;
+      });
+}
