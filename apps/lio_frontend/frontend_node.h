@@ -9,6 +9,7 @@
 #include "messages/odometry_messages.h"
 #include "messages/sensor_messages.h"
 #include "runtime/lcm_link.h"
+#include "runtime/rate_limit.h"
 
 namespace ignis {
 
@@ -31,10 +32,13 @@ class FrontendNode {
 
   runtime::IgnisConfig config_;
   runtime::LcmLink link_;
+  runtime::ReceiverCounts* imu_counts_ = nullptr;
   runtime::ReceiverCounts* scan_counts_ = nullptr;
+  runtime::ReceiverCounts* request_counts_ = nullptr;
   Lio lio_;
   messages::ScanAssembler assembler_;
   std::deque<Keyframe> sent_keyframes_;  // ring for KEYFRAME_REQUEST
+  RateLimit resends_{100.0, 100.0};      // keyframes a second; back end and map together ask for at most 85
   Utime newest_utime_ = 0;
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;

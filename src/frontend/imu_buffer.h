@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/leap_guard.h"
 #include "common/measurements.h"
 
 namespace ignis {
@@ -36,7 +37,8 @@ class ImuBuffer {
   /// Appends a sample, or says why not. Depends on earlier samples only.
   ///
   /// A stamp more than a second ahead of the stream is put aside: taken at its word, one corrupt stamp would make all
-  /// later samples "late". Only when the next sample carries on from it was it a gap, and that one is taken.
+  /// later samples "late". Only when the next sample carries on from it was it a gap, and that one is taken. The very
+  /// first sample gives way to one more than a second before it.
   ImuFault add(const ImuSample& sample);
 
   /// Appends a made-up sample where the IMU is silent. Its interval counts as a gap.
@@ -59,14 +61,13 @@ class ImuBuffer {
   static constexpr std::size_t kMedianLength = 31;
 
   [[nodiscard]] ImuFault judge(const ImuSample& sample);
-  [[nodiscard]] bool leaps_ahead(Utime utime);
   [[nodiscard]] double nominal_period_us() const;
 
   std::vector<ImuSample> samples_;
   std::vector<double> periods_before_;
   std::array<std::int64_t, kMedianLength> intervals_us_{};  ///< ring of the last intervals
   std::size_t interval_count_ = 0;
-  std::optional<Utime> put_aside_;  ///< stamp of the last leap
+  LeapGuard leap_guard_;
   ImuCounters counters_;
 };
 
