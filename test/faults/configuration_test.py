@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows C1 to C3: every key of the configuration misspelt and given every kind of wrong value, all in one message each."""
+"""Rows C1 to C3: every key misspelt and given every kind of wrong value, named in one message each."""
 
 import json
 import subprocess

@@ -3,6 +3,7 @@
 
 import os
 import random
+import resource
 import signal
 import subprocess
 import time
@@ -57,30 +58,44 @@ def test_fault_p7_sigterm_at_any_moment_is_a_clean_end(process: str, private_net
     assert not list(tmp_path.rglob("*.tmp")), "nothing half-written stays behind"
 
 
-@pytest.mark.parametrize("process", ["lio_frontend", "graph_backend", "map_builder", "lio_replay"])
-def test_fault_p8_without_memory_it_ends_with_a_message_and_no_half_file(
-    process: str, drive_log: Path, tmp_path: Path
+def test_fault_p8_a_replay_without_memory_ends_with_a_message_and_no_half_file(
+    drive_log: Path, run_binary, tmp_path: Path
 ) -> None:
-    more: list[object] = [drive_log, "--out", tmp_path / "out"] if process == "lio_replay" else []
-    if process == "map_builder":
-        more = ["--port", 0]
-    ended = {}
-    # From too little to load the libraries to nearly enough to work.
-    for megabytes in (40, 120, 200, 260, 320):
-        command = ["prlimit", f"--as={megabytes * 2**20}", binary(process), "--config", CONFIG, *map(str, more)]
-        try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, timeout=4.0, env={**os.environ, "LCM_DEFAULT_URL": BUS}
-            )
-        except subprocess.TimeoutExpired:
-            break  # it has enough
-        if done.returncode == 0:
-            break
-        ended[megabytes] = (done.returncode, done.stderr.strip()[-200:])
-        assert done.stderr.strip(), "it must say something"
-        assert not list((tmp_path).rglob("*.tmp"))
-    print(process, ended)
-    assert ended
+    replay = [binary("lio_replay"), drive_log, "--config", CONFIG, "--out", tmp_path / "out"]
+    done = subprocess.run(
+        ["prlimit", f"--as={120 * 2**20}", *map(str, replay)], capture_output=True, text=True, timeout=60.0
+    )
+    assert done.returncode == 1 and "bad_alloc" in done.stderr, done.stderr[-300:]
+    assert not list(tmp_path.rglob("*.tmp"))
+
+
+def address_space(pid: int) -> int:
+    """[bytes] in use."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_fault_p8_without_memory_in_mid_drive_a_process_ends_with_a_message(
+    drive_log: Path, private_network: None, tmp_path: Path
+) -> None:
+    run = FaultRun(tmp_path)
+    with run:
+        limited: dict[str, subprocess.Popen] = {}
+        player = run.pipeline.start("lcm-logplayer", "--speed=2", "--regexp=L1_(IMU|SCAN)", drive_log)
+        end = time.monotonic() + 3.0
+        while time.monotonic() < end:
+            run.bus.handle_timeout(50)
+        for name in ("lio_frontend", "map_builder"):
+            process = limited[name] = run.pipeline.processes[name]
+            limit = address_space(process.pid)
+            resource.prlimit(process.pid, resource.RLIMIT_AS, (limit, limit))
+        player.wait(60.0)
+        time.sleep(1.0)
+        for name, process in limited.items():
+            said = run.pipeline.last_words(name)
+            print(name, process.poll(), said)
+            # What it has set aside may last; then nothing has gone wrong.
+            assert process.poll() in (None, 1) or "alloc" in said, (name, process.poll(), said)
+        assert any(process.poll() is not None for process in limited.values()), "the limit must bite"
 
 
 def test_fault_b3_a_receiver_frozen_for_two_seconds_loses_nothing(
