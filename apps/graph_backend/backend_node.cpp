@@ -4,6 +4,7 @@
 #include <format>
 #include <iostream>
 
+#include "backend/keyframe_check.h"
 #include "ignis/graph_command_t.hpp"
 #include "runtime/channels.h"
 
@@ -42,8 +43,8 @@ BackendNode::BackendNode(const runtime::Application& application, const std::fil
   T_map_odom_ = graph_.smoother().T_map_odom();
   keyframe_counts_ = &link_.subscribe<keyframe_t>(channels::kKeyframe, config_.lcm.keyframe_queue,
                                                   [this](const keyframe_t& part) { on_keyframe_part(part); });
-  link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,
-                           [this](const state_t& message) { on_state(message); });
+  state_counts_ = &link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,
+                                            [this](const state_t& message) { on_state(message); });
   link_.subscribe<graph_command_t>(
       channels::kGraphCommand, kCommandQueue, [this](const graph_command_t& command) { on_command(command); },
       runtime::Senders::kSeveral);
@@ -62,6 +63,7 @@ void BackendNode::spin_once() {
 void BackendNode::on_keyframe_part(const keyframe_t& part) {
   std::optional<Keyframe> keyframe = assembler_.add(part);
   if (!keyframe) return;
+  if (refuse_damaged(*keyframe)) return;
   if (keyframe->session != graph_.session() || graph_.smoother().is_of_another_drive(*keyframe)) {
     begin_session(keyframe->session);
   }
@@ -70,11 +72,23 @@ void BackendNode::on_keyframe_part(const keyframe_t& part) {
   add_waiting_keyframes();
 }
 
+/// A damaged keyframe says nothing about the drive that it comes from: it must not end the one in the graph, nor take
+/// the place of the sound one with its id, which is asked for again.
+bool BackendNode::refuse_damaged(const Keyframe& keyframe) {
+  const std::string problem = keyframe_problem(keyframe);
+  if (problem.empty()) return false;
+  refusal_ = std::format("keyframe {} of session {} refused: {}", keyframe.id, keyframe.session, problem);
+  ++keyframe_counts_->rejected;
+  return true;
+}
+
 void BackendNode::begin_session(std::int32_t session) {
   graph_.begin_session(session);
   inbox_.clear();
   T_map_odom_ = Pose{};
   last_update_ = {};
+  newest_state_.reset();
+  last_smoothed_utime_ = 0;
   refusal_.clear();
 }
 
@@ -154,10 +168,24 @@ void BackendNode::publish_loop(const LoopResult& result) {
   link_.publish(channels::kLoopResult, message);
 }
 
+/// What is not finite, leaps ahead alone or goes back is left out: stamps of SMOOTHED_STATE only increase.
+bool BackendNode::is_next_state(const NavState& state) {
+  if (!state.T_odom_body.all_finite() || !state.v_odom.allFinite() ||
+      (newest_state_ && state_leaps_.leaps_ahead(*newest_state_, state.utime))) {
+    ++state_counts_->rejected;
+    return false;
+  }
+  if (newest_state_ && state.utime <= *newest_state_) return false;
+  newest_state_ = state.utime;
+  return true;
+}
+
 void BackendNode::on_state(const state_t& message) {
-  if (message.session != graph_.session() || message.utime < last_smoothed_utime_ + kSmoothedStatePeriod) return;
-  last_smoothed_utime_ = message.utime;
+  if (message.session != graph_.session()) return;
   NavState state = messages::from_message(message);
+  if (!is_next_state(state)) return;
+  if (state.utime < last_smoothed_utime_ + kSmoothedStatePeriod) return;
+  last_smoothed_utime_ = state.utime;
   state.T_odom_body = T_map_odom_ * state.T_odom_body;
   state.v_odom = T_map_odom_.rotation * state.v_odom;
   state_t smoothed = messages::to_message(state, graph_.session(), "map");

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
+#include "common/leap_guard.h"
 #include "keyframe_inbox.h"
 #include "lasting_graph.h"
 #include "messages/graph_messages.h"
@@ -27,6 +29,8 @@ class BackendNode {
   void on_state(const state_t& message);
   void on_command(const graph_command_t& command);
   void add_waiting_keyframes();
+  [[nodiscard]] bool refuse_damaged(const Keyframe& keyframe);
+  [[nodiscard]] bool is_next_state(const NavState& state);
   void begin_session(std::int32_t session);
   void request_missing_keyframes();
   void follow_shadow();
@@ -39,12 +43,15 @@ class BackendNode {
   runtime::IgnisConfig config_;
   runtime::LcmLink link_;
   runtime::ReceiverCounts* keyframe_counts_ = nullptr;
+  runtime::ReceiverCounts* state_counts_ = nullptr;
   messages::KeyframeAssembler assembler_;
   LastingGraph graph_;
   KeyframeInbox inbox_;
   ShadowWorker shadow_;
   Pose T_map_odom_;
   Utime newest_utime_ = 0;
+  std::optional<Utime> newest_state_;  // [us] of LIO_STATE
+  LeapGuard state_leaps_;
   Utime last_smoothed_utime_ = 0;
   std::chrono::steady_clock::time_point last_full_{};
   SmootherUpdate last_update_;

@@ -38,10 +38,11 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
     checkpoints_ = std::make_unique<CheckpointFolder>(checkpoint_folder);
     resume();
   }
-  link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue, [this](const imu_t& message) { on_imu(message); });
+  imu_counts_ =
+      &link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue, [this](const imu_t& message) { on_imu(message); });
   scan_counts_ = &link_.subscribe<scan_t>(channels::kScan, config_.lcm.scan_queue,
                                           [this](const scan_t& part) { on_scan_part(part); });
-  link_.subscribe<keyframe_request_t>(
+  request_counts_ = &link_.subscribe<keyframe_request_t>(
       channels::kKeyframeRequest, kKeyframeRequestQueue,
       [this](const keyframe_request_t& request) { on_request(request); }, runtime::Senders::kSeveral);
 }
@@ -72,7 +73,11 @@ void FrontendNode::spin_once() {
 
 void FrontendNode::on_imu(const imu_t& message) {
   const auto [result, milliseconds] = timed([&] { return lio_.add_imu(messages::from_message(message)); });
-  newest_utime_ = std::max(newest_utime_, message.utime);
+  if (result.fault == ImuFault::kNone) {
+    newest_utime_ = message.utime;
+  } else {
+    ++imu_counts_->rejected;
+  }
   publish(result.scans, milliseconds);
   if (result.state) publish_state(*result.state, nullptr);
 }
@@ -123,6 +128,10 @@ void FrontendNode::on_request(const keyframe_request_t& request) {
   for (const Keyframe& keyframe : sent_keyframes_) {
     if (keyframe.session != request.session || std::ranges::find(request.ids, keyframe.id) == request.ids.end())
       continue;
+    if (!resends_.allow(std::chrono::steady_clock::now())) {
+      ++request_counts_->rejected;
+      return;
+    }
     for (const keyframe_t& part : messages::to_messages(keyframe)) link_.publish(channels::kKeyframe, part);
   }
 }

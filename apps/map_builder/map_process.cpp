@@ -109,7 +109,18 @@ bool MapProcess::accept_session(std::int32_t session) {
   return true;
 }
 
+/// Looked at before the session is: what is damaged must not end the drive that is shown.
+bool MapProcess::refuse_pose(const Pose& pose) {
+  if (usable(pose)) return false;
+  ++refused_messages_;
+  return true;
+}
+
 void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
+  if (!usable(cloud.T_odom_body)) {
+    ++refused_clouds_;
+    return;
+  }
   if (!accept_session(cloud.session)) return;
   const InsertCounts counts =
       timed(budget_.insertion, [&] { return map_.insert_scan(cloud.points, cloud.T_odom_body); });
@@ -123,6 +134,7 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
 }
 
 void MapProcess::on_keyframe(const Keyframe& keyframe) {
+  if (refuse_pose(keyframe.state.T_odom_body)) return;
   if (!accept_session(keyframe.session) || map_.clouds().contains(keyframe.id)) return;
   if (!map_.add_keyframe(keyframe)) return;
   events_.keyframe(keyframe.state.utime, keyframe.id);
@@ -130,7 +142,7 @@ void MapProcess::on_keyframe(const Keyframe& keyframe) {
 }
 
 void MapProcess::on_revision(const messages::GraphRevision& revision) {
-  if (!accept_session(revision.session)) return;
+  if (refuse_pose(revision.T_map_odom) || !accept_session(revision.session)) return;
   std::vector<CorrectedPose> poses;
   poses.reserve(revision.poses.size());
   for (const KeyframePose& pose : revision.poses) poses.push_back({pose.id, pose.T_map_body});
@@ -164,6 +176,7 @@ void MapProcess::on_scan_stats(const scan_stats_t& scan) {
 }
 
 void MapProcess::on_state(const state_t& state) {
+  if (refuse_pose(messages::from_message(state).T_odom_body)) return;
   hud_.state = state;
   hud_.has_state = true;
   hud_.T_map_body = map_.T_map_odom() * messages::from_message(state).T_odom_body;
@@ -356,9 +369,9 @@ void MapProcess::report() {
   if (map_.voxels().coarsening() > 0) {
     state = health_t::DEGRADED;
     hud_.health = "DEGRADED: map.max_voxels is reached, the finest level is left out";
-  } else if (refused_clouds_ + map_.refused_poses() > 0) {
+  } else if (const std::int64_t poses = refused_messages_ + map_.refused_poses(); refused_clouds_ + poses > 0) {
     state = health_t::DEGRADED;
-    hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, map_.refused_poses());
+    hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, poses);
   }
   ViewUpdate update;
   update.api_status = shared(status_json(hud_, budget_, server_.counters(), pictures_, loops_.text()));
@@ -370,10 +383,9 @@ void MapProcess::report() {
 
 void MapProcess::request_missing_keyframes() {
   keyframe_request_t request;
-  // The newest ones may still be on their way.
-  for (const std::int32_t id : map_.missing_keyframes(graph_keyframes_ - 1)) {
-    if (request.ids.size() < kMaxRequestedIds && request_counts_[id]++ < kMaxRequests) request.ids.push_back(id);
-  }
+  // The newest ones may still be on their way. How many there are is another's word: no list that long is made.
+  request.ids = map_.missing_keyframes(graph_keyframes_ - 1, kMaxRequestedIds,
+                                       [this](std::int32_t id) { return request_counts_[id]++ < kMaxRequests; });
   if (request.ids.empty()) return;
   request.utime = hud_.map.utime;
   request.sequence = request_sequence_++;

@@ -37,6 +37,7 @@ class MapProcess {
 
   void subscribe(const runtime::LcmConfig& lcm);
   [[nodiscard]] bool accept_session(std::int32_t session);
+  [[nodiscard]] bool refuse_pose(const Pose& pose);
   void on_cloud(const messages::PosedCloud& cloud);
   void on_keyframe(const Keyframe& keyframe);
   void on_revision(const messages::GraphRevision& revision);
@@ -86,6 +87,7 @@ class MapProcess {
   std::map<double, SharedPicture> pictures_;
   std::int64_t picture_number_ = 0;
   std::int64_t refused_clouds_ = 0;
+  std::int64_t refused_messages_ = 0;  // with a pose that no map can hold
   std::int32_t graph_keyframes_ = 0;
   std::map<std::int32_t, int> request_counts_;
   std::int32_t request_sequence_ = 0;

@@ -35,9 +35,10 @@ std::string_view host_of_origin(std::string_view origin) {
 bool host_is_allowed(std::string_view host, std::string_view allowed_origin) {
   const std::string_view name = name_of(host);
   if (same_ignoring_case(name, "localhost")) return true;
+  // The system reads an address up to the first NUL, whatever stands behind it.
   boost::system::error_code error;
   boost::asio::ip::make_address(std::string(name), error);
-  if (!error) return true;
+  if (!error && !name.contains('\0')) return true;
   return !host.empty() && same_ignoring_case(host, host_of_origin(allowed_origin));
 }
 

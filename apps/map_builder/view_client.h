@@ -18,9 +18,9 @@
 
 #include "map/client_request.h"
 #include "map_builder/frame_cache.h"
-#include "map_builder/rate_limit.h"
 #include "map_builder/stream_counters.h"
 #include "map_builder/view_board.h"
+#include "runtime/rate_limit.h"
 
 namespace ignis {
 

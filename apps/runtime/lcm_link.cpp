@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <format>
+#include <iostream>
+#include <new>
 #include <utility>
 
 #include <unistd.h>
@@ -17,6 +19,7 @@ constexpr std::chrono::seconds kHealthPeriod{1};
 constexpr std::chrono::milliseconds kTextPeriod{200};
 constexpr double kSamplePeriod_s = 1.0;
 constexpr int kHealthQueue = 100;
+constexpr char kSocketName[] = "UDP";  // in HEALTH, for what the kernel dropped before any channel was known
 
 Utime system_utime() {
   return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -40,6 +43,7 @@ LcmLink::LcmLink(const Application& application)
                 .version = version(),
                 .config_hash = application.config_hash},
       lcm_(application.config.lcm.url),
+      address_(BusAddress::parse(application.config.lcm.url)),
       budget_(application.config.health.limits_of(application.name)),
       peers_(identity_) {
   if (!lcm_.good()) throw UserError(cannot_open(application.config.lcm.url), kFailed);
@@ -49,22 +53,48 @@ void LcmLink::subscribe_raw(Receiver& receiver, int queue_capacity) {
   lcm::Subscription* subscription = lcm_.subscribeFunction(receiver.counts.channel, &LcmLink::on_message, &receiver);
   if (subscription == nullptr) throw UserError(std::format("cannot subscribe to {}", receiver.counts.channel), kFailed);
   subscription->setQueueCapacity(queue_capacity);
-  receiver.budget = &budget_;
+  receiver.link = this;
+  // LCM opens its socket at the first subscription.
+  if (address_ && !socket_) socket_ = BusSocket::guard(*address_);
 }
 
 void LcmLink::on_message(const lcm::ReceiveBuffer* buffer, const std::string&, Receiver* receiver) {
+  LcmLink& link = *receiver->link;
   // A datagram without a channel terminator reaches the handler with a negative size.
   if (buffer->data == nullptr || static_cast<std::int32_t>(buffer->data_size) < 0) {
-    ++receiver->counts.rejected;
+    link.refuse(*receiver, "a datagram without a body", false);
     return;
   }
-  receiver->deliver({static_cast<const std::byte*>(buffer->data), buffer->data_size});
+  link.take({static_cast<const std::byte*>(buffer->data), buffer->data_size}, *receiver);
   // LCM's receiving thread stamps with the system's clock, so this compares with it.
-  receiver->budget->add_latency(1e-3 * static_cast<double>(system_utime() - buffer->recv_utime));
+  link.budget_.add_latency(1e-3 * static_cast<double>(system_utime() - buffer->recv_utime));
+}
+
+void LcmLink::take(std::span<const std::byte> data, Receiver& receiver) {
+  try {
+    if (receiver.deliver(data)) {
+      receiver.refusals.taken(uptime_s());
+      return;
+    }
+  } catch (...) {
+    // What a handler cannot live with ends the process, but not from within LCM.
+    failure_ = std::current_exception();
+    return;
+  }
+  const std::string foreign = Refusals::foreign_type(data, receiver.type);
+  refuse(receiver, foreign.empty() ? "its length or its stamp is impossible" : foreign, !foreign.empty());
+}
+
+void LcmLink::refuse(Receiver& receiver, const std::string& reason, bool is_foreign) {
+  ++receiver.counts.rejected;
+  if (!receiver.refusals.refused(reason, is_foreign, uptime_s())) return;
+  std::cerr << std::format("{}: {}: message {} refused: {}\n", identity_.process, receiver.counts.channel,
+                           receiver.refusals.count(), reason);
 }
 
 bool LcmLink::handle(int timeout_ms) {
   const int handled = lcm_.handleTimeout(timeout_ms);
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
   if (handled >= 0) ++progress_;
   return handled > 0;
 }
@@ -97,9 +127,21 @@ void LcmLink::sample_budget() {
 
 std::string LcmLink::own_trouble() const {
   std::string text = peers_.trouble(uptime_s());
-  const std::string budget = budget_.trouble();
-  if (!text.empty() && !budget.empty()) text += "; ";
-  return text + budget;
+  const auto add = [&text](const std::string& more) {
+    if (!text.empty() && !more.empty()) text += "; ";
+    text += more;
+  };
+  add(budget_.trouble());
+  for (const Receiver& receiver : receivers_) {
+    const std::string refusal = receiver.refusals.trouble(uptime_s());
+    if (!refusal.empty()) add(std::format("{}: {}", receiver.counts.channel, refusal));
+  }
+  return text;
+}
+
+std::int8_t LcmLink::own_state() const {
+  const auto taken = [this](const Receiver& receiver) { return receiver.refusals.is_taken_by_another(uptime_s()); };
+  return std::ranges::any_of(receivers_, taken) ? health_t::FAULT : health_t::DEGRADED;
 }
 
 void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets) {
@@ -107,11 +149,11 @@ void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& s
   sample_budget();
   supervisor_.turn(progress_, uptime_s());
 
-  health_t message;
+  health_t message{};
   message.state = state;
   message.state_text = state_text;
   if (const std::string trouble = own_trouble(); !trouble.empty()) {
-    message.state = std::max(state, health_t::DEGRADED);
+    message.state = std::max(state, own_state());
     message.state_text = state == health_t::OK ? trouble : std::format("{}; {}", state_text, trouble);
   }
   const auto now = std::chrono::steady_clock::now();
@@ -143,14 +185,16 @@ void LcmLink::publish_health(health_t& message) {
   message.cpu_limit_percent = limits.cpu_percent;
   message.memory_limit_mb = limits.memory_mb;
   message.latency_limit_ms = limits.latency_ms;
-  message.num_receivers = static_cast<std::int32_t>(receivers_.size());
-  for (const Receiver& receiver : receivers_) {
-    message.channels.push_back(receiver.counts.channel);
-    message.received.push_back(receiver.counts.received);
-    message.lost.push_back(receiver.counts.lost);
-    message.rejected.push_back(receiver.counts.rejected);
-    message.queue_drops.push_back(receiver.counts.queue_drops);
-  }
+  const auto list = [&message](const ReceiverCounts& counts) {
+    ++message.num_receivers;
+    message.channels.push_back(counts.channel);
+    message.received.push_back(counts.received);
+    message.lost.push_back(counts.lost);
+    message.rejected.push_back(counts.rejected);
+    message.queue_drops.push_back(counts.queue_drops);
+  };
+  for (const Receiver& receiver : receivers_) list(receiver.counts);
+  if (socket_) list({.channel = kSocketName, .rejected = socket_->dropped()});
   publish(channels::kHealth, message);
 }
 

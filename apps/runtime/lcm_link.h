@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <string>
@@ -13,7 +14,9 @@
 #include "messages/length_check.h"
 #include "runtime/application.h"
 #include "runtime/budget_watch.h"
+#include "runtime/bus_socket.h"
 #include "runtime/peer_watch.h"
+#include "runtime/refusals.h"
 #include "runtime/sequence_tracker.h"
 #include "runtime/service_notifier.h"
 
@@ -50,15 +53,14 @@ class LcmLink {
                             Senders senders = Senders::kOne) {
     Receiver& receiver = receivers_.emplace_back();
     receiver.counts.channel = channel;
+    receiver.type = Message::getHash();
     receiver.deliver = [&receiver, handler = std::move(handler), senders](std::span<const std::byte> data) {
       Message message;
-      if (!messages::decode_checked(data, message)) {
-        ++receiver.counts.rejected;
-        return;
-      }
+      if (!messages::decode_checked(data, message)) return false;
       ++receiver.counts.received;
       if (senders == Senders::kOne) receiver.counts.lost += receiver.sequence.observe(message.sequence);
       handler(message);
+      return true;
     };
     subscribe_raw(receiver, queue_capacity);
     return receiver.counts;
@@ -84,21 +86,29 @@ class LcmLink {
   struct Receiver {
     ReceiverCounts counts;
     SequenceTracker sequence;
-    std::function<void(std::span<const std::byte>)> deliver;
-    BudgetWatch* budget = nullptr;
+    Refusals refusals;
+    std::int64_t type = 0;                                    ///< fingerprint of the messages that belong here
+    std::function<bool(std::span<const std::byte>)> deliver;  ///< false: not well-formed
+    LcmLink* link = nullptr;
   };
 
   void subscribe_raw(Receiver& receiver, int queue_capacity);
   static void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel, Receiver* receiver);
+  void take(std::span<const std::byte> data, Receiver& receiver);
+  void refuse(Receiver& receiver, const std::string& reason, bool is_foreign);
   void watch_peers();
   void sample_budget();
   void publish_health(health_t& message);
   [[nodiscard]] std::string own_trouble() const;
+  [[nodiscard]] std::int8_t own_state() const;
   [[nodiscard]] double uptime_s() const;
 
   PeerIdentity identity_;
   lcm::LCM lcm_;
   std::deque<Receiver> receivers_;  // a deque keeps addresses stable
+  std::optional<BusAddress> address_;
+  std::optional<BusSocket> socket_;
+  std::exception_ptr failure_;  // of a handler; LCM's C code must not see it
   std::atomic<std::int64_t> failed_sends_ = 0;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point last_health_{};

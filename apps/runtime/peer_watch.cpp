@@ -4,12 +4,22 @@
 #include <format>
 
 namespace ignis::runtime {
+namespace {
+
+constexpr std::size_t kMaxTextLength = 64;  // our names, versions and fingerprints are shorter
+
+}  // namespace
 
 void PeerWatch::observe(const PeerIdentity& peer, double now_s) {
   if (peer.process == self_.process && peer.pid == self_.pid) return;
   std::erase_if(peers_, [&](const auto& entry) { return now_s - entry.second.last_s > kForgetAfter_s; });
-  Heard& heard = peers_[{peer.process, peer.pid}];
-  heard.peer = peer;
+  const std::pair key{peer.process.substr(0, kMaxTextLength), peer.pid};
+  if (peers_.size() >= kMaxPeers && !peers_.contains(key)) return;
+  Heard& heard = peers_[key];
+  heard.peer = {.process = key.first,
+                .pid = peer.pid,
+                .version = peer.version.substr(0, kMaxTextLength),
+                .config_hash = peer.config_hash.substr(0, kMaxTextLength)};
   heard.last_s = now_s;
   ++heard.messages;
 }

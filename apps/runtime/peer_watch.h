@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -26,6 +27,9 @@ class PeerWatch {
   static constexpr double kForgetAfter_s = 3.0;
   /// HEALTH messages of a second instance before it is believed: a killed process's last one may still be on its way.
   static constexpr int kInstanceMessages = 3;
+
+  /// Processes remembered at most: names and numbers come from the bus.
+  static constexpr std::size_t kMaxPeers = 32;
 
   explicit PeerWatch(PeerIdentity self) : self_(std::move(self)) {}
 

@@ -12,8 +12,9 @@ class SequenceTracker {
   /// Messages missed between the newest one seen so far and this one. Parts of one sequence, repeats and late arrivals
   /// count nothing; keyframes sent again have old numbers. A number far below the newest means a new sender.
   std::int64_t observe(std::int32_t sequence) {
-    constexpr std::int32_t kRestartDistance = 1000;
-    if (!newest_ || sequence < *newest_ - kRestartDistance) {
+    // 64 bits wide: a forged number may be the smallest or the largest there is.
+    constexpr std::int64_t kRestartDistance = 1000;
+    if (!newest_ || sequence < std::int64_t{*newest_} - kRestartDistance) {
       newest_ = sequence;
       return 0;
     }

@@ -25,6 +25,16 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
+/// The parser's complaint quotes the bytes that it stumbled over; a message for people is text.
+std::string readable(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    const bool is_plain = c >= ' ' && c <= '~';
+    result += is_plain ? std::string(1, c) : std::format("<{:02X}>", static_cast<unsigned char>(c));
+  }
+  return result;
+}
+
 }  // namespace
 
 Json parse_json(const std::string& text, const std::string& source) {
@@ -45,7 +55,7 @@ Json parse_json(const std::string& text, const std::string& source) {
     json = Json::parse(text, watch);
   } catch (const Json::exception& error) {
     // What the callback refused is the cause; the parser's own complaint may only be its consequence.
-    if (fault.empty()) fault = std::format("not valid JSON: {}", error.what());
+    if (fault.empty()) fault = std::format("not valid JSON: {}", readable(error.what()));
   }
   if (!fault.empty()) throw ConfigError(std::format("{}: {}", source, fault));
   if (!json.is_object()) throw ConfigError(std::format("{}: the outermost value must be an object", source));

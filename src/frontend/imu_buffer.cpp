@@ -11,7 +11,6 @@ namespace {
 constexpr double kMaxRate = 200.0;          // rad/s
 constexpr double kMaxAccel = 2000.0;        // m/s^2
 constexpr double kCoastingPeriods = 400.0;  // as uncertain as a gap of this length: twenty times the sigma
-constexpr std::int64_t kLeapUs = kMicrosPerSecond;
 
 }  // namespace
 
@@ -50,26 +49,23 @@ ImuFault ImuBuffer::judge(const ImuSample& sample) {
     ++counters_.late;
     return ImuFault::kLate;
   }
-  if (leaps_ahead(sample.utime)) {
+  if (!samples_.empty() && leap_guard_.leaps_ahead(newest(), sample.utime)) {
     ++counters_.leaps;
     return ImuFault::kLeap;
   }
   return ImuFault::kNone;
 }
 
-bool ImuBuffer::leaps_ahead(Utime utime) {
-  if (samples_.empty() || utime - newest() <= kLeapUs) {
-    put_aside_.reset();
-    return false;
-  }
-  const bool carries_on = put_aside_ && utime > *put_aside_ && utime - *put_aside_ <= kLeapUs;
-  put_aside_ = utime;
-  return !carries_on;
-}
-
 ImuFault ImuBuffer::add(const ImuSample& sample) {
   const ImuFault fault = judge(sample);
-  if (fault != ImuFault::kNone) return fault;
+  // A first sample that nothing has confirmed must not shut out all that follow: its stamp was the broken one.
+  const bool begins_anew =
+      fault == ImuFault::kLate && samples_.size() == 1 && newest() - sample.utime > kMicrosPerSecond;
+  if (begins_anew) {
+    samples_.clear();
+    periods_before_.clear();
+  }
+  if (fault != ImuFault::kNone && !begins_anew) return fault;
   double periods = 0.0;
   if (!samples_.empty()) {
     const std::int64_t interval = sample.utime - newest();

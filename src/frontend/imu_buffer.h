@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/byte_codec.h"
+#include "common/leap_guard.h"
 #include "common/measurement_bytes.h"
 #include "common/measurements.h"
 
@@ -50,7 +51,8 @@ class ImuBuffer {
   /// Appends a sample, or says why not. Depends on earlier samples only.
   ///
   /// A stamp more than a second ahead of the stream is put aside: taken at its word, one corrupt stamp would make all
-  /// later samples "late". Only when the next sample carries on from it was it a gap, and that one is taken.
+  /// later samples "late". Only when the next sample carries on from it was it a gap, and that one is taken. The very
+  /// first sample gives way to one more than a second before it.
   ImuFault add(const ImuSample& sample);
 
   /// Appends a made-up sample where the IMU is silent. Its interval counts as a gap.
@@ -73,14 +75,13 @@ class ImuBuffer {
   static constexpr std::size_t kMedianLength = 31;
 
   [[nodiscard]] ImuFault judge(const ImuSample& sample);
-  [[nodiscard]] bool leaps_ahead(Utime utime);
   [[nodiscard]] double nominal_period_us() const;
 
   std::vector<ImuSample> samples_;
   std::vector<double> periods_before_;
   std::array<std::int64_t, kMedianLength> intervals_us_{};  ///< ring of the last intervals
   std::size_t interval_count_ = 0;
-  std::optional<Utime> put_aside_;  ///< stamp of the last leap
+  LeapGuard leap_guard_;
   ImuCounters counters_;
 
   friend void transfer(auto& io, FieldsOf<ImuBuffer> auto& buffer) {
@@ -88,7 +89,7 @@ class ImuBuffer {
     io.list(buffer.periods_before_);
     for (auto& interval : buffer.intervals_us_) io.number(interval);
     io.number(buffer.interval_count_);
-    io.maybe(buffer.put_aside_);
+    transfer(io, buffer.leap_guard_);
     transfer(io, buffer.counters_);
   }
 };

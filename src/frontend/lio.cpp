@@ -165,8 +165,9 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     live_ = predict_nominal(live_, midpoint(previous, sample), seconds_between(previous.utime, sample.utime),
                             config_.gravity_m);
     live_.utime = sample.utime;
-  } else if (std::optional<FilterState> first = initialisation_.add(sample)) {
-    start(*first);
+  } else {
+    if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
+    if (std::optional<FilterState> first = initialisation_.add(sample)) start(*first);
   }
   result.scans = process_pending();
   if (running_) {
@@ -220,6 +221,12 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
 
 std::vector<ScanResult> Lio::process_pending() {
   std::vector<ScanResult> results;
+  // Came before the first inertial sample, when nothing was known that its stamp could be held against.
+  if (!pending_.empty() && !imu_.empty() && pending_.front().end_utime() > imu_.newest() + kMaxLeadUs) {
+    results.push_back(refuse(pending_.front(), ScanReason::kBadStamp));
+    pending_.pop_front();
+    last_scan_end_.reset();
+  }
   while (!pending_.empty() && !imu_.empty() && pending_.front().end_utime() <= imu_.newest()) {
     results.push_back(process(pending_.front()));
     pending_.pop_front();

@@ -243,11 +243,12 @@ std::vector<Eigen::Vector3f> LiveMap::placed_cloud(std::int32_t id) const {
   return points;
 }
 
-std::vector<std::int32_t> LiveMap::missing_keyframes(std::int32_t count) const {
+std::vector<std::int32_t> LiveMap::missing_keyframes(std::int32_t count, std::size_t limit,
+                                                     const std::function<bool(std::int32_t)>& wanted) const {
   std::vector<std::int32_t> missing;
-  for (std::int32_t id = 0; id < count; ++id) {
+  for (std::int32_t id = 0; id < count && missing.size() < limit; ++id) {
     const auto found = nodes_.find(id);
-    if (found == nodes_.end() || !found->second.has_cloud) missing.push_back(id);
+    if ((found == nodes_.end() || !found->second.has_cloud) && wanted(id)) missing.push_back(id);
   }
   return missing;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <set>
 #include <span>
@@ -101,8 +102,9 @@ class LiveMap {
   /// The cloud of a keyframe at its corrected pose [m, map]; empty when it is not in store.
   [[nodiscard]] std::vector<Eigen::Vector3f> placed_cloud(std::int32_t id) const;
 
-  /// Keyframe ids below `count` whose cloud never arrived.
-  [[nodiscard]] std::vector<std::int32_t> missing_keyframes(std::int32_t count) const;
+  /// Keyframe ids below `count` whose cloud never arrived and which `wanted` agrees to; the first `limit` of them.
+  [[nodiscard]] std::vector<std::int32_t> missing_keyframes(std::int32_t count, std::size_t limit,
+                                                            const std::function<bool(std::int32_t)>& wanted) const;
 
  private:
   struct Node {

@@ -102,14 +102,26 @@ inline constexpr std::span<const LayoutStep> kLayout<pose_t> = layouts::kPose;
 template <>
 inline constexpr std::span<const LayoutStep> kLayout<health_t> = layouts::kHealth;
 
-/// Decodes a whole message. Empty result: another type, another version, or a body whose length contradicts its counts.
+/// Whether the stamps leave room for arithmetic: sums and differences of them cannot overflow. 36,000 years.
+template <class Message>
+[[nodiscard]] bool stamps_are_possible(const Message& message) {
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 60;
+  const auto possible = [](std::int64_t utime) { return utime > -kFarthest && utime < kFarthest; };
+  if constexpr (requires { message.previous_utime; }) {
+    if (!possible(message.previous_utime)) return false;
+  }
+  return possible(message.utime);
+}
+
+/// Decodes a whole message. False: another type, another version, a body whose length contradicts its counts, or a
+/// stamp that no clock shows.
 template <class Message>
 [[nodiscard]] bool decode_checked(std::span<const std::byte> data, Message& message) {
   constexpr std::size_t kFingerprintBytes = 8;
   if (data.size() < kFingerprintBytes) return false;
   if (!length_is_consistent(kLayout<Message>, data.subspan(kFingerprintBytes))) return false;
   const int size = static_cast<int>(data.size());
-  return message.decode(data.data(), 0, size) == size;
+  return message.decode(data.data(), 0, size) == size && stamps_are_possible(message);
 }
 
 }  // namespace ignis::messages

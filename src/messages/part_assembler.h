@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace ignis::messages {
@@ -26,19 +28,16 @@ class PartAssembler {
       abandon();
       return std::vector<Message>{part};
     }
-    if (parts_.empty() || sequence_ != part.sequence || std::ssize(parts_) != part.part_count) {
+    if (parts_.empty() || sequence_ != part.sequence || part_count_ != part.part_count) {
       abandon();
       sequence_ = part.sequence;
-      parts_.resize(static_cast<std::size_t>(part.part_count));
-      missing_ = part.part_count;
+      part_count_ = part.part_count;
     }
-    std::optional<Message>& slot = parts_[static_cast<std::size_t>(part.part)];
-    if (!slot) --missing_;
-    slot = part;
-    if (missing_ > 0) return std::nullopt;
+    parts_.insert_or_assign(part.part, part);
+    if (std::ssize(parts_) < part_count_) return std::nullopt;
     std::vector<Message> complete;
     complete.reserve(parts_.size());
-    for (std::optional<Message>& each : parts_) complete.push_back(std::move(*each));
+    for (auto& [number, each] : parts_) complete.push_back(std::move(each));
     parts_.clear();
     return complete;
   }
@@ -52,10 +51,11 @@ class PartAssembler {
     parts_.clear();
   }
 
-  std::vector<std::optional<Message>> parts_;
-  std::int64_t missing_ = 0;
+  // By number, and only those that came: an announced count costs no memory.
+  std::map<std::int16_t, Message> parts_;
   std::int64_t incomplete_ = 0;
   std::int32_t sequence_ = 0;
+  std::int16_t part_count_ = 0;
 };
 
 }  // namespace ignis::messages

@@ -42,6 +42,16 @@ TEST(ImuBuffer, OneStampFarAheadDoesNotBlockTheStream) {
   EXPECT_EQ(buffer.newest(), now);
 }
 
+TEST(Fault_F9, AFirstStampOfTheFarFutureGivesWay) {
+  ImuBuffer buffer;
+  EXPECT_EQ(buffer.add(at(3'600'000'000)), ImuFault::kNone);
+  EXPECT_EQ(buffer.add(at(4000)), ImuFault::kNone);
+  EXPECT_EQ(buffer.add(at(3'600'000'000)), ImuFault::kLeap);
+  EXPECT_EQ(buffer.add(at(8000)), ImuFault::kNone);
+  EXPECT_EQ(buffer.samples().size(), 2U);
+  EXPECT_EQ(buffer.newest(), 8000);
+}
+
 TEST(ImuBuffer, TakesALongGapOnceTheStreamCarriesOnBeyondIt) {
   ImuBuffer buffer;
   Utime now = 0;

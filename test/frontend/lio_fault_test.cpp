@@ -2,6 +2,7 @@
 //
 // Faults of the streams that the odometry has to survive, by their numbers in the fault list.
 #include <gtest/gtest.h>
+#include <functional>
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +30,11 @@ struct Watched {
   std::vector<ScanResult> scans;
   std::vector<std::pair<Utime, Trust>> trust;  ///< after each arrival
 
-  explicit Watched(const Drive& input, const FrontendConfig& config = test::tuned_config()) : lio(config) {
+  explicit Watched(
+      const Drive& input, const FrontendConfig& config = test::tuned_config(),
+      const std::function<void(Lio&)>& before = [](Lio&) {})
+      : lio(config) {
+    before(lio);
     // Corrupt stamps must not decide what arrives when: nothing arrives more than a tenth of a second after the last.
     auto imu = input.imu.begin();
     Utime now = input.imu.front().utime;
@@ -239,6 +244,22 @@ TEST(Fault_F9, AStampOfTheFarFutureBlocksNothing) {
       std::ranges::count_if(run.scans, [](const ScanResult& r) { return r.stats.reason == ScanReason::kBadStamp; }), 1);
   EXPECT_TRUE(run.scans.back().stats.applied());
   EXPECT_LT(run.error_at_end(), 0.2);
+}
+
+TEST(Fault_F9, StampsOfTheFarFutureBeforeAllOthersLeaveTheResultBitIdentical) {
+  const Drive input = drive();
+  const Watched run(input, test::tuned_config(), [&](Lio& lio) {
+    Scan scan = input.scans.front();
+    scan.utime += 7'200'000'000;
+    EXPECT_TRUE(lio.add_scan(scan).empty()) << "nothing is known yet that speaks against it";
+    ImuSample sample = input.imu.front();
+    sample.utime += 3'600'000'000;
+    EXPECT_EQ(lio.add_imu(sample).scans.size(), 1U) << "the scan is refused";
+  });
+  const Watched undisturbed(input);
+  EXPECT_TRUE(run.scans.back().stats.applied());
+  EXPECT_EQ(run.scans.back().state.T_odom_body.translation, undisturbed.scans.back().state.T_odom_body.translation);
+  EXPECT_EQ(run.scans.back().covariance, undisturbed.scans.back().covariance);
 }
 
 TEST(Fault_F11, BeingCarriedElsewhereIsALossANewSessionAndAFind) {

@@ -213,8 +213,16 @@ TEST(LiveMap, NamesTheKeyframesThatNeverCame) {
   LiveMap map(MapConfig{});
   map.add_keyframe(keyframe(0, Pose{}));
   map.add_keyframe(keyframe(3, Pose{}));
-  EXPECT_EQ(map.missing_keyframes(5), (std::vector<std::int32_t>{1, 2, 4}));
-  EXPECT_EQ(map.missing_keyframes(3), (std::vector<std::int32_t>{1, 2}));
+  const auto all = [](std::int32_t) { return true; };
+  EXPECT_EQ(map.missing_keyframes(5, 10, all), (std::vector<std::int32_t>{1, 2, 4}));
+  EXPECT_EQ(map.missing_keyframes(3, 10, all), (std::vector<std::int32_t>{1, 2}));
+  EXPECT_EQ(map.missing_keyframes(5, 10, [](std::int32_t id) { return id != 1; }), (std::vector<std::int32_t>{2, 4}));
+}
+
+TEST(Fault_B5, AnAbsurdNumberOfKeyframesMakesNoAbsurdList) {
+  LiveMap map(MapConfig{});
+  const auto missing = map.missing_keyframes(std::numeric_limits<std::int32_t>::max(), 3, [](auto) { return true; });
+  EXPECT_EQ(missing, (std::vector<std::int32_t>{0, 1, 2}));
 }
 
 TEST(LiveMap, ClearForgetsTheDriveButNotTheCounts) {

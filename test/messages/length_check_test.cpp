@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "messages/length_check.h"
 
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -105,6 +106,18 @@ TYPED_TEST(LengthCheck, SurvivesEverySingleAlteredWord) {
 TEST(LengthCheckTypes, RefusesAnotherTypeOnTheChannel) {
   pose_t decoded;
   EXPECT_FALSE(decode_checked(std::span<const std::byte>(encoded(imu_t{})), decoded));
+}
+
+TEST(Fault_B5, StampsThatLeaveNoRoomForArithmeticAreRefused) {
+  imu_t message{};
+  imu_t decoded;
+  EXPECT_TRUE(decode_checked(encoded(message), decoded));
+  message.utime = std::numeric_limits<std::int64_t>::max();
+  EXPECT_FALSE(decode_checked(encoded(message), decoded));
+  keyframe_t keyframe{};
+  keyframe.previous_utime = std::numeric_limits<std::int64_t>::min();
+  keyframe_t decoded_keyframe;
+  EXPECT_FALSE(decode_checked(encoded(keyframe), decoded_keyframe));
 }
 
 }  // namespace

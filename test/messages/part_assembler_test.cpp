@@ -42,5 +42,30 @@ TEST(PartAssembler, RefusesImpossibleNumbering) {
   EXPECT_EQ(assembler.incomplete(), 3);
 }
 
+/// Counts how many of it live.
+struct CountedPart : Part {
+  CountedPart(std::int32_t number, std::int16_t place, std::int16_t places) : Part{number, place, places} { ++alive; }
+  CountedPart(const CountedPart& other) : Part(other) { ++alive; }
+  CountedPart& operator=(const CountedPart&) = default;
+  ~CountedPart() { --alive; }
+  static inline int alive = 0;
+};
+
+TEST(Fault_B5, AnAnnouncedNumberOfPartsCostsNoMemory) {
+  PartAssembler<CountedPart> assembler;
+  EXPECT_FALSE(assembler.add({1, 0, 32767}));
+  EXPECT_FALSE(assembler.add({1, 9, 32767}));
+  EXPECT_EQ(CountedPart::alive, 2);
+  static_assert(sizeof(PartAssembler<CountedPart>) < 100, "nothing is set aside for parts to come");
+}
+
+TEST(PartAssembler, BeginsAnewWhenThePartsDisagreeAboutTheirNumber) {
+  PartAssembler<Part> assembler;
+  EXPECT_FALSE(assembler.add({1, 0, 3}));
+  EXPECT_FALSE(assembler.add({1, 1, 2}));
+  EXPECT_EQ(assembler.incomplete(), 1);
+  EXPECT_TRUE(assembler.add({1, 0, 2}));
+}
+
 }  // namespace
 }  // namespace ignis::messages

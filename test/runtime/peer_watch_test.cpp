@@ -67,5 +67,13 @@ TEST(PeerWatch, BelievesInASecondInstanceOnlyWhenItGoesOn) {
   EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 9)");
 }
 
+TEST(Fault_B6, AFloodOfInventedProcessesIsRememberedInPart) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = peer(std::string(60'000, 'x'), 0);
+  other.config_hash = other.version = std::string(60'000, 'y');
+  for (other.pid = 0; other.pid < 1000; ++other.pid) watch.observe(other, 1.0);
+  EXPECT_LT(watch.trouble(1.0).size(), 32 * 300U) << "it must fit into a message";
+}
+
 }  // namespace
 }  // namespace ignis::runtime

@@ -37,13 +37,13 @@ class Computer:
 
     def run(self, *words: object) -> subprocess.CompletedProcess:
         """Runs a command in it to its end."""
-        return subprocess.run(self._line(*words), capture_output=True, text=True, check=False)
+        return subprocess.run(self.line(*words), capture_output=True, text=True, check=False)
 
     def start(self, name: str, *arguments: object) -> subprocess.Popen:
         """Starts a process in it."""
         with open(self.folder / f"{name}.log", "wb") as log:
             process = subprocess.Popen(
-                self._line(program(name), *arguments),
+                self.line(program(name), *arguments),
                 stdout=log,
                 stderr=log,
                 env={**os.environ, "LCM_DEFAULT_URL": URL},
@@ -67,7 +67,8 @@ class Computer:
         self.holder.kill()
         self.holder.wait()
 
-    def _line(self, *words: object) -> list[str]:
+    def line(self, *words: object) -> list[str]:
+        """A command line that runs in it."""
         return ["nsenter", "-t", str(self.holder.pid), "-n", *map(str, words)]
 
 
@@ -153,7 +154,7 @@ def test_ttl_zero_stays_at_home(tmp_path: Path) -> None:
         for ttl, reaches in ((0, False), (1, True)):
             url = URL.replace("ttl=1", f"ttl={ttl}")
             talker = subprocess.Popen(
-                near._line(binary("map_builder"), "--config", CONFIG, "--port", 0, "--lcm-url", url),
+                near.line(binary("map_builder"), "--config", CONFIG, "--port", 0, "--lcm-url", url),
                 stdout=subprocess.DEVNULL,
             )
             shown = far.run(*home, url)

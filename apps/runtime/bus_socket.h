@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace ignis::runtime {
+
+/// What the bus's URL says about the datagrams that may come in.
+struct BusAddress {
+  std::uint16_t port = 0;
+  bool stays_home = true;  ///< ttl=0: nobody sends to another computer, so nothing from one is ours
+
+  /// Nothing for buses that are no UDP multicast, such as memq.
+  static std::optional<BusAddress> parse(const std::string& url);
+};
+
+/// Stands in front of LCM's receiving socket with a filter in the kernel. All our messages fit one datagram, so no
+/// fragment is ever ours: what is refused here costs LCM no buffer (a fragment may announce 256 MB) and never meets its
+/// reassembly, which adds offset and size in 32 bits (upstream's pull request 628). With ttl=0, datagrams from other
+/// computers are refused too. What is refused, and what found the buffer full, the kernel counts.
+class BusSocket {
+ public:
+  /// Finds the socket that LCM has bound in this process and puts the filter on it. Nothing when there is none (no
+  /// subscription yet, another kind of bus). Throws std::system_error when the kernel refuses the filter.
+  static std::optional<BusSocket> guard(const BusAddress& address);
+
+  /// Datagrams that the kernel has dropped at this socket: refused by the filter, or the buffer was full.
+  [[nodiscard]] std::uint32_t dropped() const;
+
+ private:
+  explicit BusSocket(int descriptor) : descriptor_(descriptor) {}
+
+  int descriptor_;  // LCM's; it lives as long as the link
+};
+
+}  // namespace ignis::runtime

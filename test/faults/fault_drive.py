@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A short simulated drive played to the real processes, while something goes wrong, and what they made of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+import urllib.request
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import ignis_lcm.ignis as types
+import lcm
+
+from ignis.pipeline import Pipeline
+
+CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
+CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
+SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
+BUS = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
+PORT = 18095
+SECONDS = 14.0
+SPEED = 2.0  # of the replay
+
+
+def record_drive(folder: Path, seconds: float = SECONDS) -> Path:
+    """Simulates the beginning of a drive; its log holds what the driver would publish, and the truth."""
+    log = folder / "drive.lcmlog"
+    with Pipeline(folder, BUS) as pipeline:
+        simulator = pipeline.start("l1_sim", "--scene", SCENE, "--config", CONFIG, "--log", log, "--duration", seconds)
+        if simulator.wait(300) != 0:
+            raise RuntimeError(pipeline.last_words("l1_sim"))
+    return log
+
+
+@dataclass
+class Seen:
+    """What was on the bus."""
+
+    keyframes: dict[int, bytes] = field(default_factory=dict)
+    poses: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    states: list[int] = field(default_factory=list)  # stamps of LIO_STATE
+    smoothed: list[Any] = field(default_factory=list)
+    health: dict[str, list[Any]] = field(default_factory=dict)
+    status: dict[str, Any] = field(default_factory=dict)
+
+    def rejected(self, process: str, channel: str) -> int:
+        """What the process says that it refused on the channel."""
+        newest = self.health[process][-1]
+        return newest.rejected[newest.channels.index(channel)]
+
+
+class FaultRun:
+    """The front end, the back end and the map, and a listener that may also send. A context manager."""
+
+    def __init__(self, folder: Path, names: tuple[str, ...] = ("map_builder", "graph_backend", "lio_frontend")) -> None:
+        self.seen = Seen()
+        self.hostile: set[int] = set()  # hashes of what the tests themselves have sent
+        self.pipeline = Pipeline(folder, BUS)
+        self.bus = lcm.LCM(BUS)
+        self._names = names
+        for channel, take in {
+            "LIO_KEYFRAME": self._on_keyframe,
+            "SMOOTHED_KEYFRAMES": self._on_revision,
+            "LIO_STATE": lambda data: self.seen.states.append(types.state_t.decode(data).utime),
+            "SMOOTHED_STATE": lambda data: self.seen.smoothed.append(types.state_t.decode(data)),
+            "HEALTH": self._on_health,
+        }.items():
+            self.bus.subscribe(channel, self._guarded(take)).set_queue_capacity(20_000)
+
+    def __enter__(self) -> FaultRun:
+        for name in self._names:
+            more = ("--port", PORT) if name == "map_builder" else ()
+            self.pipeline.start(name, "--config", CONFIG, *more)
+        self.listen(1.0)
+        wanted = set(self._names)
+        deadline = time.monotonic() + 20.0
+        while set(self.seen.health) < wanted:
+            assert time.monotonic() < deadline, f"only {set(self.seen.health)} spoke"
+            self.listen(0.1)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.pipeline.stop(*reversed(self.pipeline.processes))
+
+    def _guarded(self, take: Callable[[bytes], None]) -> Callable[[str, bytes], None]:
+        def handler(_: str, data: bytes) -> None:
+            # What is not ours may be anything.
+            if hash(data) not in self.hostile:
+                take(data)
+
+        return handler
+
+    def _on_keyframe(self, data: bytes) -> None:
+        part = types.keyframe_t.decode(data)
+        if part.part == 0:
+            self.seen.keyframes.setdefault(part.id, data)
+
+    def _on_revision(self, data: bytes) -> None:
+        part = types.smoothed_keyframes_t.decode(data)
+        rows = zip(part.px, part.py, part.pz, part.qw, part.qx, part.qy, part.qz, strict=True)
+        self.seen.poses.update(zip(part.ids, rows, strict=True))
+
+    def _on_health(self, data: bytes) -> None:
+        message = types.health_t.decode(data)
+        if message.pid in {process.pid for process in self.pipeline.processes.values()}:
+            self.seen.health.setdefault(message.process, []).append(message)
+
+    def send(self, channel: str, body: bytes) -> None:
+        """Publishes what nobody should send; the listener knows it again."""
+        self.hostile.add(hash(body))
+        self.bus.publish(channel, body)
+
+    def listen(self, seconds: float) -> None:
+        """Handles what arrives for so long; every process must live."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            self.bus.handle_timeout(max(int(1000 * left), 1))
+        self.pipeline.check("lcm-logplayer")
+
+    def play(self, log: Path, meanwhile: Callable[[float], None] = lambda _: None, speed: float = SPEED) -> None:
+        """Plays the sensor's part of a log; `meanwhile` is called often with the seconds since the start."""
+        player = self.pipeline.start("lcm-logplayer", f"--speed={speed}", "--regexp=L1_(IMU|SCAN)", log)
+        began = time.monotonic()
+        while player.poll() is None:
+            for _ in range(20):
+                self.bus.handle_timeout(2)
+            meanwhile(time.monotonic() - began)
+            self.pipeline.check("lcm-logplayer")
+        assert player.returncode == 0
+        self.listen(3.5)  # a full set of poses comes every two seconds, HEALTH every second
+
+    def view_status(self, seconds: float = 3.0) -> dict[str, Any]:
+        """What the map's status page says, when it answers in time."""
+        with urllib.request.urlopen(f"http://127.0.0.1:{PORT}/api/status", timeout=seconds) as answer:
+            return json.load(answer)

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows P7 and P8 at the real processes: stopped at any moment, frozen, out of memory; and a full disk."""
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import lcm
+import pytest
+
+from fault_drive import BUS, CONFIG, PORT, FaultRun, Seen
+from ignis.pipeline import Pipeline, binary
+
+PROCESSES = ("lio_frontend", "graph_backend", "map_builder", "l1_driver")
+SEED = 77
+STOPS = 6
+STOP_WITHIN_S = 2.0
+
+
+def arguments(process: str, folder: Path) -> list[object]:
+    """What the process needs beside its configuration."""
+    if process == "map_builder":
+        return ["--port", PORT, "--out", folder / "map"]
+    if process == "graph_backend":
+        return ["--journal", folder / "journal"]
+    if process == "l1_driver":
+        # A device that exists and never says anything.
+        return ["--port", os.ttyname(os.openpty()[1])]
+    return []
+
+
+@pytest.mark.parametrize("process", PROCESSES)
+def test_fault_p7_sigterm_at_any_moment_is_a_clean_end(process: str, private_network: None, tmp_path: Path) -> None:
+    generator = random.Random(SEED)
+    more = arguments(process, tmp_path)
+    waits = [generator.uniform(0.0, 0.5) for _ in range(STOPS)]
+    print("seed", SEED, "waits", waits)
+    for wait in waits:
+        with Pipeline(tmp_path, BUS) as pipeline:
+            started = pipeline.start(process, "--config", CONFIG, *more)
+            # Until its signal handlers stand, the system's own end applies; from then on the end is ours.
+            caught = Path(f"/proc/{started.pid}/status")
+            deadline = time.monotonic() + 20.0
+            while not int(
+                next(line for line in caught.read_text().splitlines() if line.startswith("SigCgt")).split()[1], 16
+            ) & (1 << (signal.SIGTERM - 1)):
+                assert time.monotonic() < deadline
+                time.sleep(0.005)
+            time.sleep(wait)
+            began = time.monotonic()
+            started.terminate()
+            assert started.wait(20.0) == 0, pipeline.last_words(process)
+            assert time.monotonic() - began < STOP_WITHIN_S
+    assert not list(tmp_path.rglob("*.tmp")), "nothing half-written stays behind"
+
+
+def test_fault_p8_a_replay_without_memory_ends_with_a_message_and_no_half_file(
+    drive_log: Path, run_binary, tmp_path: Path
+) -> None:
+    replay = [binary("lio_replay"), drive_log, "--config", CONFIG, "--out", tmp_path / "out"]
+    done = subprocess.run(
+        ["prlimit", f"--as={120 * 2**20}", *map(str, replay)], capture_output=True, text=True, timeout=60.0
+    )
+    assert done.returncode == 1 and "bad_alloc" in done.stderr, done.stderr[-300:]
+    assert not list(tmp_path.rglob("*.tmp"))
+
+
+def address_space(pid: int) -> int:
+    """[bytes] in use."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_fault_p8_without_memory_in_mid_drive_a_process_ends_with_a_message(
+    drive_log: Path, private_network: None, tmp_path: Path
+) -> None:
+    run = FaultRun(tmp_path)
+    with run:
+        limited: dict[str, subprocess.Popen] = {}
+        player = run.pipeline.start("lcm-logplayer", "--speed=2", "--regexp=L1_(IMU|SCAN)", drive_log)
+        end = time.monotonic() + 3.0
+        while time.monotonic() < end:
+            run.bus.handle_timeout(50)
+        for name in ("lio_frontend", "map_builder"):
+            process = limited[name] = run.pipeline.processes[name]
+            limit = address_space(process.pid)
+            resource.prlimit(process.pid, resource.RLIMIT_AS, (limit, limit))
+        player.wait(60.0)
+        time.sleep(1.0)
+        for name, process in limited.items():
+            said = run.pipeline.last_words(name)
+            print(name, process.poll(), said)
+            # What it has set aside may last; then nothing has gone wrong.
+            assert process.poll() in (None, 1) or "alloc" in said, (name, process.poll(), said)
+        assert any(process.poll() is not None for process in limited.values()), "the limit must bite"
+
+
+def test_fault_b3_a_receiver_frozen_for_two_seconds_loses_nothing(
+    drive_log: Path, undisturbed: Seen, tmp_path: Path
+) -> None:
+    generator = random.Random(SEED)
+    with FaultRun(tmp_path) as run:
+        frozen_at = generator.uniform(1.5, 2.5)
+        frontend = run.pipeline.processes["lio_frontend"]
+        state = {"frozen": False, "done": False}
+
+        def meanwhile(seconds: float) -> None:
+            if seconds > frozen_at and not state["frozen"]:
+                state["frozen"] = True
+                frontend.send_signal(signal.SIGSTOP)
+            # The log plays at twice its speed: one second of wall time holds what two of the sensor's do.
+            if seconds > frozen_at + 1.0 and not state["done"]:
+                state["done"] = True
+                frontend.send_signal(signal.SIGCONT)
+
+        run.play(drive_log, meanwhile)
+        newest = run.seen.health["lio_frontend"][-1]
+        lost = dict(zip(newest.channels, newest.lost, strict=True))
+    assert state["done"] and lost["L1_IMU"] == lost["L1_SCAN"] == 0
+    assert run.seen.keyframes == undisturbed.keyframes
+
+
+def test_fault_b7_a_route_lost_in_mid_drive_is_counted_and_its_return_resumes(drive_log: Path, tmp_path: Path) -> None:
+    route = ["224.0.0.0/4", "dev", "lo"]
+    with FaultRun(tmp_path, ("lio_frontend",)) as run:
+        state = {"lost": False, "back": False, "before": 0}
+
+        def meanwhile(seconds: float) -> None:
+            if seconds > 2.0 and not state["lost"]:
+                state["lost"], state["before"] = True, len(run.seen.states)
+                subprocess.run(["ip", "route", "del", *route], check=True)
+            if seconds > 3.5 and not state["back"]:
+                state["back"] = True
+                subprocess.run(["ip", "route", "add", *route], check=True)
+
+        try:
+            run.play(drive_log, meanwhile)
+        finally:
+            subprocess.run(["ip", "route", "replace", *route], check=True)
+        newest = run.seen.health["lio_frontend"][-1]
+    assert state["back"] and len(run.seen.states) > state["before"] + 500, "the pose flows again"
+    assert newest.failed_sends > 0 or newest.lost[newest.channels.index("L1_IMU")] > 0, "the loss is counted"
+
+
+def test_fault_l1_a_full_disk_ends_replay_and_map_with_the_path_and_no_half_file(
+    drive_log: Path, run_binary, private_network: None, tmp_path: Path
+) -> None:
+    full = tmp_path / "full"
+    full.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", full], check=True)
+    try:
+        done = run_binary("lio_replay", drive_log, "--config", CONFIG, "--out", full / "run", seconds=120.0)
+        assert done.returncode == 1 and str(full) in done.stderr
+        assert not list(full.rglob("*.tmp"))
+    finally:
+        subprocess.run(["umount", full], check=True)
+
+
+def test_fault_p6_a_killed_logger_costs_the_log_at_most_a_tenth_of_a_second(
+    private_network: None, drive_log: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "killed.lcmlog"
+    bus = lcm.LCM(BUS)
+    with Pipeline(tmp_path, BUS) as pipeline:
+        logger = pipeline.start("lcm-logger", "--quiet", "--flush-interval=50", log)
+        time.sleep(1.0)
+        sent = []
+        end = time.monotonic() + 2.0
+        while time.monotonic() < end:
+            sent.append(time.time())
+            bus.publish("L1_IMU", len(sent).to_bytes(8, "big"))
+            time.sleep(0.004)
+        logger.kill()
+        logger.wait()
+    from ignis.logs import read_log
+
+    events = [event for event in lcm.EventLog(str(log), "r") if event.channel == "L1_IMU"]
+    assert events and read_log(log) is not None
+    kept = int.from_bytes(events[-1].data, "big")
+    assert sent[-1] - sent[kept - 1] < 0.1 + 0.1, "0.1 s is promised; the machine may be busy"

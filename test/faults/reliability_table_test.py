@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/reliability.md holds every row of the fault list, and each test that it names exists; every reason is tested."""
+
+import os
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
+TABLE = CHECKOUT / "docs" / "reliability.md"
+ROWS = {"D": 6, "F": 11, "B": 7, "T": 2, "G": 5, "M": 4, "W": 8, "L": 4, "C": 4, "P": 9}
+CPP_TEST = re.compile(r"^(?:TEST|TEST_F|TEST_P|TYPED_TEST)\((\w+),\s*(\w+)", re.MULTILINE)
+PYTHON_TEST = re.compile(r"^\s*def (test_\w+)", re.MULTILINE)
+# Where reasons are defined, and those that no input is known to cause.
+ENUMS = {
+    "ScanReason": ("src/frontend/scan_stats.h", {"kNumericalFailure", "kUnobservable"}),
+    "LoopReason": ("src/backend/loop_result.h", set()),
+    "KeyframeVerdict": ("src/backend/smoother.h", {"kSolver"}),
+    "ImuFault": ("src/frontend/imu_buffer.h", set()),
+}
+
+
+@cache
+def cpp_sources() -> dict[Path, str]:
+    return {path: path.read_text() for path in (CHECKOUT / "test").rglob("*_test.cpp")}
+
+
+def existing_tests() -> set[str]:
+    """Every test as the table names it: Suite.Name, or file.py::test_name."""
+    found = {f"{suite}.{name}" for text in cpp_sources().values() for suite, name in CPP_TEST.findall(text)}
+    for path in (CHECKOUT / "test").rglob("*_test.py"):
+        found |= {f"{path.name}::{name}" for name in PYTHON_TEST.findall(path.read_text())}
+    for path in (CHECKOUT / "test").rglob("test_*.py"):
+        found |= {f"{path.name}::{name}" for name in PYTHON_TEST.findall(path.read_text())}
+    found |= {f"fuzz_{path.name.removesuffix('_fuzz.cpp')}" for path in (CHECKOUT / "fuzz").glob("*_fuzz.cpp")}
+    return found
+
+
+def table_rows() -> dict[str, str]:
+    """The table's rows by their number."""
+    lines = (line for line in TABLE.read_text().splitlines() if re.match(r"\| [A-Z]\d+ \|", line))
+    return {line.split("|")[1].strip(): line for line in lines}
+
+
+def test_every_row_of_the_fault_list_stands_in_the_table() -> None:
+    expected = {f"{letter}{number}" for letter, count in ROWS.items() for number in range(1, count + 1)}
+    assert set(table_rows()) == expected
+
+
+def test_every_test_that_the_table_names_exists() -> None:
+    existing = existing_tests()
+    for number, line in table_rows().items():
+        column = line.split("|")[3]
+        named = re.findall(r"`([^`]+)`", column)
+        assert named or "none" in column, f"{number}: neither a test nor a word about its absence"
+        missing = [name for name in named if name not in existing]
+        assert not missing, (number, missing)
+
+
+@pytest.mark.parametrize("enum", ENUMS)
+def test_every_reason_is_emitted_by_some_test(enum: str) -> None:
+    file, unreachable = ENUMS[enum]
+    body = re.search(rf"enum class {enum}\b.*?\{{(.*?)\}};", (CHECKOUT / file).read_text(), re.DOTALL)
+    assert body
+    names = set(re.findall(r"\bk[A-Z]\w+", re.sub(r"//.*", "", body[1])))
+    assert len(names) > 3
+    # Lists of names beside the message's constants emit nothing.
+    lines = [line for text in cpp_sources().values() for line in text.splitlines() if '{"' not in line]
+    tested = {name for name in names if any(re.search(rf"{enum}::{name}\b", line) for line in lines)}
+    assert tested == names - unreachable
