@@ -49,9 +49,9 @@ class FrontendNode {
   messages::ScanAssembler assembler_;
   std::deque<Keyframe> sent_keyframes_;  // ring for KEYFRAME_REQUEST
   std::unique_ptr<CheckpointFolder> checkpoints_;
-  std::string told_note_;      // Lio::start_note() as it was last printed
-  Utime last_checkpoint_ = 0;  // [us] scan time
-  RateLimit resends_{100.0, 100.0};      // keyframes a second; back end and map together ask for at most 85
+  std::string told_note_;            // Lio::start_note() as it was last printed
+  Utime last_checkpoint_ = 0;        // [us] scan time
+  RateLimit resends_{100.0, 100.0};  // keyframes a second; back end and map together ask for at most 85
   Utime newest_utime_ = 0;
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;

@@ -119,8 +119,8 @@ class LocalMap {
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
       const int bit = std::countr_zero(left);
       auto& scan = block.rows[bit / kEdge].scan[bit % kEdge];
-      Eigen::Matrix<float, 5, 1> voxel;
-      voxel << block.point(bit), scan, block.weight[bit];
+      const Eigen::Vector3f point = block.point(bit);
+      Eigen::Matrix<float, 5, 1> voxel(point.x(), point.y(), point.z(), scan, block.weight[bit]);
       io.matrix(voxel);
       if constexpr (requires { block.weight[bit] = 0; }) {
         block.set_point(bit, voxel.head<3>());
