@@ -80,10 +80,10 @@ def ignis(folder: Path, command: str) -> subprocess.Popen:
 def scratch(private_network, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder that holds what the pages take for granted, while a simulated vehicle drives."""
     folder = tmp_path_factory.mktemp("docs")
-    (folder / "elsewhere").mkdir()  # for what makes files of the same names
-    for place in (folder, folder / "elsewhere"):
+    for place in (folder, *(folder / page.name for page in PAGES)):
+        place.mkdir(exist_ok=True)
         (place / "config").symlink_to(CHECKOUT / "config")
-    shutil.copy(CONFIG, folder / "other.json")
+    shutil.copy(CHECKOUT / "config" / "ignis8.json", folder / "other.json")
     shutil.copy(CHECKOUT / "config" / "schema.json", folder)
     simulate = [Path(os.environ["IGNIS_BUILD"]) / "bin" / "l1_sim", "--scene", SCENE, "--config", CONFIG]
     for output in ("--log", "drive.lcmlog"), ("--capture", "capture.bin"):
@@ -102,7 +102,8 @@ def scratch(private_network, tmp_path_factory: pytest.TempPathFactory) -> Iterat
 @pytest.mark.parametrize(("page", "command"), RUN, ids=lambda value: value[:50])
 def test_command_runs_as_the_page_shows_it(scratch: Path, page: str, command: str) -> None:
     endless = bool(ENDLESS.search(command))
-    process = ignis(scratch / "elsewhere" if endless else scratch, command)
+    # Recordings of two pages have the same name, and that of the drive.
+    process = ignis(scratch / page if endless else scratch, command)
     try:
         output, _ = process.communicate(timeout=ENDLESS_SECONDS if endless else 180.0)
         name = shlex.split(command)[1]
