@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -77,6 +78,7 @@ def _demo(options: argparse.Namespace) -> int:
             print(f"ignis: what each process said is in {pipeline.logs}", file=sys.stderr)
             return EXIT_FAILURE
         except KeyboardInterrupt:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # A second Ctrl-C must not cost the evaluation.
             print("\nInterrupted; evaluating what was driven.", flush=True)
             options.no_serve = True
         pipeline.stop("l1_sim", "l1_driver", "lio_frontend", "graph_backend", "lcm-logger")
