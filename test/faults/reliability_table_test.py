@@ -15,7 +15,7 @@ CPP_TEST = re.compile(r"^(?:TEST|TEST_F|TEST_P|TYPED_TEST)\((\w+),\s*(\w+)", re.
 PYTHON_TEST = re.compile(r"^\s*def (test_\w+)", re.MULTILINE)
 # Where reasons are defined, and those that no input is known to cause.
 ENUMS = {
-    "ScanReason": ("src/frontend/scan_stats.h", {"kNumericalFailure", "kUnobservable"}),
+    "ScanReason": ("src/frontend/scan_stats.h", set()),
     "LoopReason": ("src/backend/loop_result.h", set()),
     "KeyframeVerdict": ("src/backend/smoother.h", {"kSolver"}),
     "ImuFault": ("src/frontend/imu_buffer.h", set()),
