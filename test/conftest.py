@@ -2,6 +2,7 @@
 """Shared by all Python tests: where the checkout, the build and the recordings are, and a network of our own."""
 
 import os
+import signal
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,8 @@ import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 os.environ.setdefault("IGNIS_CHECKOUT", str(CHECKOUT))
+# Started in the background of a script, Ctrl-C is ignored, and every process that a test starts would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

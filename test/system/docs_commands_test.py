@@ -30,6 +30,7 @@ NOT_RUN = {
     r"ignis format": "changes the checkout",
     r"ignis shell( +#|$)": "a shell for people",
     r"packaging/|vehicle_cost": "minutes, and needs root or the package",
+    r"ignis bench|bench/|soak\.py": "minutes to an hour",
     r"backend_endurance|sweep a\.lcmlog|warehouse\.json +--out": "minutes",
     r"ADDRESS": "needs several computers",
     r"shared/data|drive\.bag|results/kitti": "needs recordings that not everybody has; other tests use them",
@@ -113,6 +114,9 @@ def test_command_runs_as_the_page_shows_it(scratch: Path, page: str, command: st
         output, _ = process.communicate(timeout=30.0)
         assert endless, f"{page}: {command}\n{output}"
         assert process.returncode in (0, 130, -signal.SIGINT), f"{page}: {command}\n{output}"
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 def test_every_row_of_the_table_has_its_command() -> None:
