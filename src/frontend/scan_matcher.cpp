@@ -242,7 +242,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
 /// The two steps are kept apart, since a direction that is off by a degree mixes them: what is off across a corridor by
 /// millimetres would be made up for by decimetres along it.
 std::optional<PoseInformation> ScanMatcher::use_doubtful(FilterState& iterate) const {
-  const PoseInformation doubtful =
+  PoseInformation doubtful =
       accumulate(iterate.nominal.T_odom_body, iterate.covariance.topLeftCorner<6, 6>()).projected(degeneracy_.doubtful);
   const UpdateStep update = information_update(iterate.covariance, Vector15d::Zero(), doubtful);
   if (!update.ok) return std::nullopt;
