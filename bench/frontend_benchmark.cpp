@@ -52,8 +52,8 @@ void downsample_scan(benchmark::State& state, const std::string& sensor) {
   count(state, cloud);
 }
 
-// 28 to 31 ns a point in voxels that the scan has met before: bound by the chain probe of the table - block of 1.2 kB -
-// voxel, each waiting for the cache line of the one before, not by the few operations on the point.
+// 36 ns a point in voxels that the scan has met before: bound by the chain probe of the table - region - block - row of
+// four voxels, each waiting for the cache line of the one before, not by the few operations on the point.
 void insert_into_map(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   LocalMap map = map_before_last(drive);
@@ -65,9 +65,8 @@ void insert_into_map(benchmark::State& state, const std::string& sensor) {
   state.counters["voxels"] = map.size();
 }
 
-// 400 ns a query for 11 to 13 neighbours. The sums are some 30 operations for each neighbour, 150 ns at one a cycle;
-// the rest are the probes of up to 27 blocks and the lines of the points in them. The dearest kernel of a match: to
-// gain, meet fewer blocks (blocks as wide as the search) or keep neighbours over the passes.
+// 190 to 230 ns a query for 11 to 13 neighbours, in five to eight rows of four voxels: 25 vector operations a row and
+// the row's one cache line. The dearest kernel of a match; to gain, keep neighbours or planes from scan to scan.
 void gather_neighbours(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const LocalMap map = map_before_last(drive);
@@ -104,9 +103,8 @@ void slide_map(benchmark::State& state, const std::string& sensor) {
   state.counters["voxels"] = full.size();
 }
 
-// 170 to 190 ns: the closed-form eigenvalues of a 3x3 matrix (arc tangent, sine, cosine, square roots) follow one from
-// another, so latency bounds it, neither memory nor the number of operations. Several planes side by side in one vector
-// register would gain.
+// 150 to 160 ns: the steps to the smallest eigenvalue follow one from another, each with a division, so latency bounds
+// it, neither memory nor the number of operations. Several planes side by side in one vector register would gain.
 void fit_planes(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const LocalMap map = map_before_last(drive);
@@ -126,7 +124,7 @@ void fit_planes(benchmark::State& state, const std::string& sensor) {
   state.counters["planes"] = planes / static_cast<double>(moments.size());
 }
 
-// 0.8 to 0.9 us a point, two thirds of it gather and plane fit, met once as long as the iterate stays; the passes over
+// 0.44 us a point, most of it gather and plane fit, met once as long as the iterate stays; the passes over
 // the constraints add some 100 ns a point each. Proportional to the points that go in, hence max_scan_points: a match
 // of 130,000 points costs no more than the 10,000 that last_thinned leaves.
 void match_scan(benchmark::State& state, const std::string& sensor) {

@@ -75,6 +75,7 @@ def draw(curves: list[tuple[Curve, np.ndarray, np.ndarray, float]], path: Path) 
         axis.set_title(f"{curve.title}: exponent {exponent:.2f}")
         axis.set_xlabel(curve.size)
         axis.set_ylabel(curve.unit)
+        axis.tick_params(axis="x", which="minor", labelbottom=False)
         axis.grid(visible=True, which="both", alpha=0.25)
     figure.savefig(path, dpi=90)
 
