@@ -30,14 +30,20 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// A host that is let in without a configured origin is an address or localhost: it has no letters but those.
+/// A host that is let in without a configured origin is localhost or an address: hexadecimal digits, and a scope such
+/// as %eth0 behind an IPv6 address. Brackets that open are closed, and nothing but a port follows them.
 void judge_host(std::string_view host) {
   if (!host_is_allowed(host, "")) return;
   const std::string name = lower(host);
-  if (name.starts_with("localhost")) return;
-  const std::string address =
-      name.starts_with('[') ? name.substr(1, name.find(']') - 1) : name.substr(0, name.find(':'));
-  // Hexadecimal digits, and a scope such as %eth0 behind an IPv6 address.
+  if (name == "localhost" || name.starts_with("localhost:")) return;
+  std::size_t end = name.find(':');
+  std::size_t begin = 0;
+  if (name.starts_with('[')) {
+    begin = 1;
+    end = name.find(']');
+    require(end != std::string::npos && (end + 1 == name.size() || name[end + 1] == ':'));
+  }
+  const std::string address = name.substr(begin, end == std::string::npos ? end : end - begin);
   require(address.find_first_not_of("0123456789abcdef.:") == std::string::npos || address.contains('%'));
 }
 

@@ -19,10 +19,26 @@ bool same_ignoring_case(std::string_view a, std::string_view b) {
   return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
-/// The host without its port, and without the brackets of an IPv6 address.
-std::string_view name_of(std::string_view host) {
-  if (host.starts_with('[')) return host.substr(1, std::min(host.find(']'), host.size()) - 1);
-  return host.substr(0, host.find(':'));
+bool is_address(std::string_view text) {
+  boost::system::error_code error;
+  boost::asio::ip::make_address(std::string(text), error);
+  // The system reads an address up to the first NUL, whatever stands behind it.
+  return !error && !text.contains('\0');
+}
+
+/// Brackets hold an IPv6 address and nothing else, and they are closed (RFC 3986, section 3.2.2).
+bool is_bracketed_address(std::string_view host) {
+  const std::size_t end = host.find(']');
+  if (end == std::string_view::npos) return false;
+  const std::string_view address = host.substr(1, end - 1);
+  const std::string_view rest = host.substr(end + 1);
+  return address.contains(':') && is_address(address) && (rest.empty() || rest.starts_with(':'));
+}
+
+bool names_an_address_or_localhost(std::string_view host) {
+  if (host.starts_with('[')) return is_bracketed_address(host);
+  const std::string_view name = host.substr(0, host.find(':'));
+  return same_ignoring_case(name, "localhost") || is_address(name);
 }
 
 std::string_view host_of_origin(std::string_view origin) {
@@ -33,12 +49,7 @@ std::string_view host_of_origin(std::string_view origin) {
 }  // namespace
 
 bool host_is_allowed(std::string_view host, std::string_view allowed_origin) {
-  const std::string_view name = name_of(host);
-  if (same_ignoring_case(name, "localhost")) return true;
-  // The system reads an address up to the first NUL, whatever stands behind it.
-  boost::system::error_code error;
-  boost::asio::ip::make_address(std::string(name), error);
-  if (!error && !name.contains('\0')) return true;
+  if (names_an_address_or_localhost(host)) return true;
   return !host.empty() && same_ignoring_case(host, host_of_origin(allowed_origin));
 }
 

@@ -93,6 +93,11 @@ def test_forged_host_is_refused(server):
     assert server.request("/", host="[::1]:8080")[0] == 200
 
 
+@pytest.mark.parametrize("host", ["[localhost", "[localhost]", "[127.0.0.1]", "[::1", "[::1]evil.example", "[]", "::1"])
+def test_a_host_with_brackets_that_hold_no_address_is_refused(server, host):
+    assert server.request("/", host=host)[0] == 403
+
+
 def test_foreign_origin_is_refused_before_the_upgrade(server):
     for origin in ("http://evil.example", "null", f"https://127.0.0.1:{server.port}", "http://127.0.0.1:1"):
         status, web_socket = server.upgrade(origin=origin)
