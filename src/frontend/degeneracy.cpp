@@ -88,13 +88,29 @@ DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6
   return judge_directions(solver.eigenvectors(), scan, needed, limits.min_sensitivity);
 }
 
+std::vector<Eigen::Vector3d> blind_shifts(const DegeneracyAnalysis& analysis) {
+  std::vector<Eigen::Vector3d> axes;
+  for (const Vector6d& direction : analysis.degenerate) {
+    const Eigen::Vector3d shift = direction.tail<3>();
+    if (shift.norm() > kMostlyShift) axes.push_back(shift.normalized());
+  }
+  return axes;
+}
+
+DegeneracyAnalysis without_known_shifts(DegeneracyAnalysis analysis, const Eigen::Matrix3d& information,
+                                        double sigma_m) {
+  std::erase_if(analysis.degenerate, [&](const Vector6d& direction) {
+    const Eigen::Vector3d shift = direction.tail<3>();
+    return shift.norm() > kMostlyShift && shift.dot(information * shift) * sigma_m * sigma_m > shift.squaredNorm();
+  });
+  analysis.degenerate_directions = static_cast<int>(analysis.degenerate.size());
+  return analysis;
+}
+
 Eigen::Matrix3d tilt_of_blind_shifts(const DegeneracyAnalysis& analysis, const Eigen::Matrix3d& position_covariance) {
   constexpr double kTilt = 0.015;  // rad, one sigma of two seconds of scans in a bare corridor
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const Vector6d& direction : analysis.degenerate) {
-    const Eigen::Vector3d shift = direction.tail<3>();
-    if (shift.norm() < kMostlyShift) continue;
-    const Eigen::Vector3d axis = shift.normalized();
+  for (const Eigen::Vector3d& axis : blind_shifts(analysis)) {
     const double along = axis.dot(position_covariance * axis);
     sum += kTilt * kTilt * along * (Eigen::Matrix3d::Identity() - axis * axis.transpose());
   }

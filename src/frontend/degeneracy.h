@@ -60,6 +60,14 @@ struct DegeneracyAnalysis {
 [[nodiscard]] DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivity& scan,
                                                   const std::array<double, 6>& needed, double min_sensitivity);
 
+/// The degenerate directions that are shifts, as unit vectors in odom axes.
+[[nodiscard]] std::vector<Eigen::Vector3d> blind_shifts(const DegeneracyAnalysis& analysis);
+
+/// The same analysis without those shifts along which `information` (of the position, odom axes, [1/m^2]) is better
+/// than `sigma_m`: for what is reported.
+[[nodiscard]] DegeneracyAnalysis without_known_shifts(DegeneracyAnalysis analysis, const Eigen::Matrix3d& information,
+                                                      double sigma_m);
+
 /// What a blind shift adds to the covariance of the other shifts [m^2]. The direction itself is known to a degree or so
 /// only, and a vehicle that is off by metres along a corridor is off by centimetres across it, in a map that has the
 /// same error. `position_covariance` in odom axes.

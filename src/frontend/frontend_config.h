@@ -59,6 +59,8 @@ struct FrontendConfig {
   double blind_residual_inflation = 4.0;
   double degeneracy_threshold = 1e-5;
   double degeneracy_signal_to_noise = 1.6;
+  double salient_sigma = 4.0;
+  double salient_share = 0.0015;
   int map_average_points = 1;
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
@@ -185,6 +187,12 @@ struct FrontendConfig {
         "degeneracy_signal_to_noise", self.degeneracy_signal_to_noise, {0.0, 1000.0}, "1",
         "sensitivity of a direction over what errors of the normals explain of it, below which it is left to the "
         "IMU");
+    visit.number("salient_sigma", self.salient_sigma, {0.0, 100.0}, "sigma",
+                 "along a direction that is left to the IMU, points still count whose plane faces along it by so many "
+                 "sigma of its normal; 0: none");
+    visit.number("salient_share", self.salient_share, {0.0, 1.0}, "1",
+                 "such points as a share of all matched ones, mean of half a second of scans, below which they are "
+                 "taken for chance");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
     visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",

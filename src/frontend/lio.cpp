@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <format>
 #include <utility>
 
 #include "frontend/deskew.h"
@@ -22,10 +21,7 @@ constexpr std::int64_t kCoastingStepUs = 10'000;           // between samples th
 constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sample the biases learn nothing
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
 constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
-constexpr int kScansUntilReacquisition = 5;                // without a correction
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
-constexpr double kConfirmationSeconds = 2.0;               // that a resumption has
-constexpr int kContradictionsOfAWrongPlace = 3;            // in a row; single ones come in any curve
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
@@ -84,61 +80,6 @@ void Lio::reset() {
   resumed_from_.reset();
   confirm_until_.reset();
   unaided_.reset();
-}
-
-void Lio::resume() {
-  resumed_from_ = imu_.newest();
-  unaided_ = filter_;
-  scans_without_correction_ = kScansUntilReacquisition;
-  trust_.note_resumption();
-  start_note_ = std::format("going on with session {}", session_);
-}
-
-bool Lio::can_be_resumed() const { return running_ && velocity_known_ && !trust_.awaits_confirmation(); }
-
-bool Lio::is_sound() const {
-  Matrix15d covariance = filter_.covariance;
-  Matrix15d cautious = cautious_;
-  const NavState& state = filter_.nominal;
-  return running_ && !imu_.empty() && make_symmetric(covariance) && make_symmetric(cautious) &&
-         state.T_odom_body.all_finite() && state.v_odom.allFinite() && state.gyro_bias.allFinite() &&
-         state.accel_bias.allFinite();
-}
-
-/// The first sample after a restart decides whether the gap can be bridged.
-void Lio::close_gap(Utime first_sample) {
-  const double gap = seconds_between(*resumed_from_, first_sample);
-  resumed_from_.reset();
-  confirm_until_ = first_sample + to_micros(kConfirmationSeconds);
-  if (gap > 0.0 && gap <= config_.resume_max_gap_s) return;
-  reset();
-  start_note_ = std::format("new session: the checkpoint is {:.1f} s older than the data (limit {:.1f})", gap,
-                            config_.resume_max_gap_s);
-}
-
-/// The first scan after a gap may settle in a wrong place, and then says so with confidence. The next ones tell.
-void Lio::seek_confirmation(ScanReason reason) {
-  if (!unaided_) return;
-  if (!trust_.awaits_confirmation()) {
-    unaided_.reset();
-    return;
-  }
-  contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
-  if (contradictions_ < kContradictionsOfAWrongPlace) return;
-  contradictions_ = 0;
-  filter_ = *unaided_;
-  cautious_ = unaided_->covariance;
-  scans_without_correction_ = kScansUntilReacquisition;
-  trust_.note_resumption();
-}
-
-/// Nobody knows where in the old map the vehicle is. Attitude to gravity, biases and velocity carry over.
-void Lio::give_up_resumption() {
-  filter_ = *unaided_;
-  cautious_ = unaided_->covariance;
-  unaided_.reset();
-  begin_new_map();
-  start_note_ = "new session: scans did not confirm the pose of the checkpoint";
 }
 
 LioStatus Lio::status() const {
@@ -289,6 +230,7 @@ ScanResult Lio::process(const Scan& scan) {
   result.covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
   result.covariance.block<3, 3>(kPosition, kPosition) +=
       tilt_of_blind_shifts(match.degeneracy, result.covariance.block<3, 3>(kPosition, kPosition));
+  drift_.remember(map_.scans(), result.covariance.block<3, 3>(kPosition, kPosition));
   if (velocity_known_) {
     const FilterState published{filter_.nominal, result.covariance};
     result.keyframe =
@@ -313,7 +255,9 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
         positions(is_large ? every_nth(sparse, config_.max_scan_points) : cloud);
     const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
     const Pose T_start = is_lost ? reacquire(filter_, points, map_, config_) : filter_.nominal.T_odom_body;
-    result = matcher_.match(filter_, T_start, points, map_);
+    const Matrix15d covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
+    const int salient_since = drift_.sure_since(covariance.block<3, 3>(kPosition, kPosition), config_.match_radius_m);
+    result = matcher_.match(filter_, T_start, points, map_, salient_since);
   }
   return result;
 }
@@ -327,6 +271,10 @@ void Lio::count_correction(const MatchResult& match) {
   scans_without_correction_ = 0;
   const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable, match.considered);
   if (update.ok) cautious_ = update.covariance;
+  if (match.salient.constraints.count == 0) return;
+  const UpdateStep along = information_update(cautious_, Vector15d::Zero(), match.salient.constraints);
+  if (along.ok) cautious_ = along.covariance;
+  drift_.hold_to(match.salient.mean_scan, blind_shifts(match.degeneracy), filter_.nominal.T_odom_body);
 }
 
 void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,

@@ -106,6 +106,8 @@ class Lio {
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;
 
+  static constexpr int kScansUntilReacquisition = 5;  ///< without a correction
+
   FrontendConfig config_;
   std::int32_t session_ = 0;
   ImuBuffer imu_;

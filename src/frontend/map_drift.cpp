@@ -8,6 +8,9 @@
 namespace ignis {
 namespace {
 
+constexpr int kScansBetweenPlacements = 10;  // half a second
+constexpr std::size_t kMostPlacements = 400;
+
 /// Takes an error of (attitude in body axes, position in odom axes) to one with both in odom axes.
 Matrix6d attitude_to_odom(const Pose& T_odom_body) {
   Matrix6d turn = Matrix6d::Identity();
@@ -29,6 +32,35 @@ void MapDrift::add_scan(const Matrix15d& covariance, const Pose& T_odom_body, do
   covariance_ = at(T_odom_body.translation);
   covariance_ += scale_ / std::max(age_scans, 1.0) * turn * covariance.topLeftCorner<6, 6>() * turn.transpose();
   position_ = T_odom_body.translation;
+}
+
+void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance) {
+  if (!placements_.empty() && scan < placements_.back().scan) placements_.clear();
+  if (!placements_.empty() && scan < placements_.back().scan + kScansBetweenPlacements) return;
+  placements_.push_back({scan, position_covariance});
+  if (placements_.size() > kMostPlacements) placements_.pop_front();
+}
+
+int MapDrift::sure_since(const Eigen::Matrix3d& position_covariance, double sigma_m) const {
+  const auto doubtful = [&](const Placement& then) {
+    return (position_covariance - then.position_covariance).diagonal().maxCoeff() > sigma_m * sigma_m;
+  };
+  const auto last_doubtful = std::ranges::find_if(placements_.rbegin(), placements_.rend(), doubtful);
+  return last_doubtful == placements_.rend() ? 0 : last_doubtful->scan + 1;
+}
+
+void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body) {
+  if (placements_.empty()) return;
+  // The first one behind that scan: uncertainty grows on the way, so this errs towards too much.
+  const auto behind = std::ranges::lower_bound(placements_, scan, {}, &Placement::scan);
+  const Placement& then = behind == placements_.end() ? placements_.back() : *behind;
+  covariance_ = at(T_odom_body.translation);
+  position_ = T_odom_body.translation;
+  auto shift = covariance_.bottomRightCorner<3, 3>();
+  for (const Eigen::Vector3d& axis : axes) {
+    const double missing = axis.dot((then.position_covariance - shift) * axis);
+    if (missing > 0.0) shift += missing * axis * axis.transpose();
+  }
 }
 
 Matrix15d MapDrift::add_to(const Matrix15d& covariance, const Pose& T_odom_body) const {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <deque>
+#include <span>
+
 #include "common/pose.h"
 #include "frontend/eskf.h"
 
@@ -33,19 +36,44 @@ class MapDrift {
   /// made of points of the age `age_scans` on average.
   void add_scan(const Matrix15d& covariance, const Pose& T_odom_body, double age_scans);
 
+  /// Remembers how well the position was known [m^2, odom axes, published covariance] when the map's scan number
+  /// `scan` was placed. Numbers ascend; a smaller one begins a new map.
+  void remember(int scan, const Eigen::Matrix3d& position_covariance);
+
+  /// The first scan whose planes are sure to be the ones that are met now: since then the position, of which
+  /// `position_covariance` is published now, has become less certain by no more than `sigma_m` along any axis.
+  [[nodiscard]] int sure_since(const Eigen::Matrix3d& position_covariance, double sigma_m) const;
+
+  /// The pose was measured along unit `axes` (odom) against planes that scan number `scan` mapped. What that takes from
+  /// the filter's covariance is only known against those planes: along these axes the position is never known better
+  /// than it was when they were placed.
+  void hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body);
+
   /// The filter's covariance plus this one, at a pose.
   [[nodiscard]] Matrix15d add_to(const Matrix15d& covariance, const Pose& T_odom_body) const;
 
  private:
   [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
 
+  struct Placement {
+    int scan = 0;
+    Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
+
+    friend void transfer(auto& io, FieldsOf<Placement> auto& placement) {
+      io.number(placement.scan);
+      io.matrix(placement.position_covariance);
+    }
+  };
+
   double scale_;
   Matrix6d covariance_ = Matrix6d::Zero();
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< where covariance_ is meant
+  std::deque<Placement> placements_;                    ///< every tenth scan of the last minutes, oldest first
 
   friend void transfer(auto& io, FieldsOf<MapDrift> auto& drift) {
     io.matrix(drift.covariance_);
     io.matrix(drift.position_);
+    io.list(drift.placements_);
   }
 };
 

@@ -18,6 +18,8 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   const ScatterAxes axes = scatter_axes(scatter);
   const Eigen::Vector3d lambda = axes.values.cwiseMax(0.0);
   fit.normal = axes.vectors.col(0);
+  fit.count = moments.count;
+  fit.scatter = lambda;
   fit.mean_scan = moments.scan_sum * inverse_count;
 
   const double tangential = (fit.offset - fit.normal * fit.normal.dot(fit.offset)).norm();

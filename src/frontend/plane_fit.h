@@ -33,6 +33,8 @@ struct PlaneFit {
   /// One sigma of the normal [rad], as the two vectors in the plane by which it may be off. From the neighbours'
   /// scatter: variance of the slope of a least-squares plane = scatter across / (count x spread along).
   Eigen::Matrix<double, 3, 2> normal_sigma = Eigen::Matrix<double, 3, 2>::Zero();
+  int count = 0;                                      ///< neighbours
+  Eigen::Vector3d scatter = Eigen::Vector3d::Zero();  ///< [m^2] their variance across the plane and in it, ascending
   double mean_scan = 0.0;  ///< [scans] mean number of the scans that the neighbours come from
 };
 

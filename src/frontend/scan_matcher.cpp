@@ -20,11 +20,23 @@ constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say littl
 // A map of so many points, a second of L1 scans, adds as much to a distance as the point does. NIS of a standing L1 in
 // that second: 100 to 200 without this, 2 to 6 of 6 degrees of freedom with it.
 constexpr double kNoisyMapPoints = 20'000.0;
+constexpr double kShareOfNewestScan = 0.1;  // in running means: half a second of scans
+constexpr double kKnownShift = 0.1;         // m: a direction that salient points hold so well is not reported as open
+constexpr auto kAll = [](const auto&) { return true; };
 
 Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, const Eigen::Vector3d& normal) {
   Vector6d h;
   h << point_body.cross(R.transpose() * normal), normal;
   return h;
+}
+
+/// A step of its own from where the iterate is; false on numerical failure.
+bool take_step(FilterState& iterate, const PoseInformation& constraints) {
+  const UpdateStep update = information_update(iterate.covariance, Vector15d::Zero(), constraints);
+  if (!update.ok) return false;
+  iterate.nominal = perturbed(iterate.nominal, update.step);
+  iterate.covariance = update.covariance;
+  return true;
 }
 
 double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
@@ -43,7 +55,8 @@ ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), wide_c
 }
 
 MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start,
-                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
+                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since) {
+  salient_since_ = salient_since;
   MatchResult result;
   result.filter = predicted;
   result.filter.nominal.T_odom_body = T_start;
@@ -61,8 +74,6 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
   result.stats.mean_innovation = assessment.mean_innovation;
   result.stats.observability = assessment.observability;
   const bool iterated = iterate(predicted, points_body, map, result);
-  result.stats.degenerate_directions = degeneracy_.degenerate_directions;
-  result.stats.unobserved = describe(degeneracy_);
   result.degeneracy = degeneracy_;
   result.map_age_scans = (map.scans() + 1.0 - mean_map_scan_) * map_noise_;
   result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
@@ -70,7 +81,12 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
     result.filter = predicted;
     result.information_body.setZero();
     result.reliable = {};
+    result.salient = {};
   }
+  const DegeneracyAnalysis open =
+      without_known_shifts(degeneracy_, result.salient.constraints.information.bottomRightCorner<3, 3>(), kKnownShift);
+  result.stats.degenerate_directions = open.degenerate_directions;
+  result.stats.unobserved = describe(open);
   return result;
 }
 
@@ -79,6 +95,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   double range_sum = 0.0;
   double scan_sum = 0.0;
+  double variance_sum = 0.0;
   for (const Eigen::Vector3f& point : points_body) {
     const Eigen::Vector3d point_body = point.cast<double>();
     const Eigen::Vector3d query = R * point_body + pose.translation;
@@ -90,13 +107,15 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       plane = fit_plane(map.gather(query, radius), wide_config_, radius);
     }
     if (plane.verdict != PlaneVerdict::kPlane) continue;
-    constraints_.push_back({point_body, plane.normal, plane.normal.dot(query + plane.offset), 1.0, plane.normal_sigma});
+    constraints_.push_back({point_body, plane, plane.normal.dot(query + plane.offset), 1.0});
     range_sum += point_body.norm();
     scan_sum += plane.mean_scan;
+    variance_sum += variance_across(plane);
   }
   const double count = std::max(static_cast<double>(constraints_.size()), 1.0);
   mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / count, 0.1);
   mean_map_scan_ = scan_sum / count;
+  pooled_variance_ = variance_sum / count;
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
@@ -105,12 +124,12 @@ ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
   const Matrix6d P = predicted.covariance.topLeftCorner<6, 6>();
   Assessment assessment;
   for (const Constraint& constraint : constraints_) {
-    const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
+    const Vector6d h = jacobian(R, constraint.point_body, constraint.plane.normal);
     assessment.mean_innovation += std::abs(residual(R, pose.translation, constraint));
-    assessment.observability += constraint.normal.cwiseAbs2();
+    assessment.observability += constraint.plane.normal.cwiseAbs2();
     assessment.sensitivity += h * h.transpose();
     for (int k = 0; k < 2; ++k) {
-      const Vector6d error = jacobian(R, constraint.point_body, constraint.normal_sigma.col(k));
+      const Vector6d error = jacobian(R, constraint.point_body, constraint.plane.normal_sigma.col(k));
       assessment.normal_noise += error * error.transpose();
     }
   }
@@ -129,6 +148,7 @@ void ScanMatcher::find_observed_directions(const Assessment& assessment, const L
   degeneracy_ =
       blind_directions_.add_scan(assessment.sensitivity, assessment.normal_noise, map.scans() >= kYoungMapScans,
                                  {mean_range_, config_.degeneracy_threshold, config_.degeneracy_signal_to_noise});
+  if (degeneracy_.degenerate_directions == 0) salient_share_ = 0.0;
 }
 
 void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
@@ -138,14 +158,14 @@ void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
   for (Constraint& constraint : constraints_) {
     double weakest = full;
     for (int axis = 0; axis < 3; ++axis) {
-      if (std::abs(constraint.normal[axis]) > kTouch) weakest = std::min(weakest, observability[axis]);
+      if (std::abs(constraint.plane.normal[axis]) > kTouch) weakest = std::min(weakest, observability[axis]);
     }
     constraint.weight = full > 0.0 ? std::max(weakest / full, config_.min_observability) : 1.0;
   }
 }
 
 double ScanMatcher::residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Constraint& constraint) {
-  return constraint.normal.dot(R * constraint.point_body + t) - constraint.plane_distance;
+  return constraint.plane.normal.dot(R * constraint.point_body + t) - constraint.plane_distance;
 }
 
 double ScanMatcher::inflation() const {
@@ -166,13 +186,14 @@ double ScanMatcher::point_variance(const Pose& pose) const {
   return std::min(variance, config_.measurement_noise);
 }
 
-PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_covariance) const {
+PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_covariance, auto counts) const {
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   const double gate2 = config_.max_innovation_sigma * config_.max_innovation_sigma;
   const double base_variance = map_noise_ * point_variance(pose);
   PoseInformation sum;
   for (const Constraint& constraint : constraints_) {
-    const Vector6d h = jacobian(R, constraint.point_body, constraint.normal);
+    if (!counts(constraint)) continue;
+    const Vector6d h = jacobian(R, constraint.point_body, constraint.plane.normal);
     const double z = residual(R, pose.translation, constraint);
     const double variance = base_variance / constraint.weight;
     if (z * z > gate2 * (h.dot(pose_covariance * h) + variance)) continue;
@@ -202,7 +223,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
       (void)assess(iterate);
       associated_at = iterate.nominal.T_odom_body;
     }
-    const PoseInformation all = accumulate(iterate.nominal.T_odom_body, gate_covariance.topLeftCorner<6, 6>());
+    const PoseInformation all = accumulate(iterate.nominal.T_odom_body, gate_covariance.topLeftCorner<6, 6>(), kAll);
     result.reliable = config_.project_degenerate ? all.projected(degeneracy_.projector) : all;
     if (pass == 0) {
       const Innovation innovation = normalised_innovation(predicted.covariance.topLeftCorner<6, 6>(), result.reliable);
@@ -224,9 +245,9 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
   }
   Matrix6d used = result.reliable.information;
   if (config_.project_degenerate && degeneracy_.degenerate_directions > 0) {
-    const std::optional<PoseInformation> doubtful = use_doubtful(iterate);
-    if (!doubtful) return false;
-    used += doubtful->information;
+    const std::optional<Matrix6d> more = step_along_degenerate(iterate, result.salient);
+    if (!more) return false;
+    used += *more;
   }
   Matrix6d to_odom = Matrix6d::Identity();
   to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
@@ -239,16 +260,37 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
   return true;
 }
 
-/// The two steps are kept apart, since a direction that is off by a degree mixes them: what is off across a corridor by
-/// millimetres would be made up for by decimetres along it.
-std::optional<PoseInformation> ScanMatcher::use_doubtful(FilterState& iterate) const {
-  PoseInformation doubtful =
-      accumulate(iterate.nominal.T_odom_body, iterate.covariance.topLeftCorner<6, 6>()).projected(degeneracy_.doubtful);
-  const UpdateStep update = information_update(iterate.covariance, Vector15d::Zero(), doubtful);
-  if (!update.ok) return std::nullopt;
-  iterate.nominal = perturbed(iterate.nominal, update.step);
-  iterate.covariance = update.covariance;
-  return doubtful;
+SalientPart ScanMatcher::find_salient(const FilterState& at) {
+  SalientPart part;
+  const std::vector<Eigen::Vector3d> axes = blind_shifts(degeneracy_);
+  const auto counts = [&](const Constraint& constraint) {
+    const bool salient = constraint.plane.mean_scan >= salient_since_ &&
+                         is_salient(constraint.plane, axes, pooled_variance_, config_.salient_sigma);
+    if (salient) part.mean_scan += constraint.plane.mean_scan;
+    return salient;
+  };
+  part.constraints = accumulate(at.nominal.T_odom_body, at.covariance.topLeftCorner<6, 6>(), counts);
+  const int count = part.constraints.count;
+  const double share = count / static_cast<double>(constraints_.size());
+  salient_share_ += kShareOfNewestScan * (share - salient_share_);
+  if (count == 0 || salient_share_ < config_.salient_share) return {};
+  part.mean_scan /= count;
+  part.constraints = part.constraints.projected(degeneracy_.blind_part);
+  return part;
+}
+
+/// Kept apart from the step along all other directions, since a direction that is off by a degree mixes them: what is
+/// off across a corridor by millimetres would be made up for by decimetres along it.
+std::optional<Matrix6d> ScanMatcher::step_along_degenerate(FilterState& iterate, SalientPart& salient) {
+  if (config_.salient_sigma > 0.0) {
+    salient = find_salient(iterate);
+    if (!take_step(iterate, salient.constraints)) return std::nullopt;
+  }
+  const PoseInformation doubtful =
+      accumulate(iterate.nominal.T_odom_body, iterate.covariance.topLeftCorner<6, 6>(), kAll)
+          .projected(degeneracy_.doubtful);
+  if (!take_step(iterate, doubtful)) return std::nullopt;
+  return salient.constraints.information + doubtful.information;
 }
 
 double ScanMatcher::mean_residual(const Pose& pose) const {

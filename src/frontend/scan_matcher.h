@@ -10,6 +10,8 @@
 #include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
 #include "frontend/local_map.h"
+#include "frontend/plane_fit.h"
+#include "frontend/salient_points.h"
 #include "frontend/scan_stats.h"
 #include "frontend/scan_update.h"
 
@@ -26,6 +28,8 @@ struct MatchResult {
   Matrix6d information_body = Matrix6d::Zero();
   /// The same as sum over the points, order and axes of PoseInformation: what the covariance may rely on.
   PoseInformation reliable;
+  /// What certain points add to that along degenerate directions, after it.
+  SalientPart salient;
   /// Projects on what `reliable` must not correct: position along directions that it leaves open, and velocity with it.
   Matrix15d considered = Matrix15d::Zero();
   DegeneracyAnalysis degeneracy;  ///< which directions that leaves open
@@ -42,17 +46,19 @@ class ScanMatcher {
   explicit ScanMatcher(const FrontendConfig& config);
 
   /// `T_start`: where to look for planes first; the predicted pose, unless that is too far off (see reacquire).
+  /// `salient_since`: the first scan of the map whose planes may count as salient. Along a blind direction the pose may
+  /// have moved against older ones by more than the matcher reaches, and what it meets then is something else.
   [[nodiscard]] MatchResult match(const FilterState& predicted, const Pose& T_start,
-                                  std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
+                                  std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
+                                  int salient_since = 0);
 
  private:
   /// A point and the plane that it was associated with. The plane stays over the passes until the iterate has moved.
   struct Constraint {
     Eigen::Vector3d point_body;
-    Eigen::Vector3d normal;                    ///< odom axes
-    double plane_distance;                     ///< [m] normal . centroid
-    double weight;                             ///< observability weight, (0, 1]
-    Eigen::Matrix<double, 3, 2> normal_sigma;  ///< see PlaneFit
+    PlaneFit plane;         ///< odom axes
+    double plane_distance;  ///< [m] normal . centroid
+    double weight;          ///< observability weight, (0, 1]
   };
   struct Assessment {
     double mean_innovation = 0.0;      ///< [m]
@@ -71,11 +77,14 @@ class ScanMatcher {
                                        const Constraint& constraint);
   [[nodiscard]] double inflation() const;
   [[nodiscard]] double point_variance(const Pose& pose) const;
-  [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance) const;
+  /// Sums the constraints that `counts` says yes to and that lie within the gate.
+  [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance, auto counts) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;
   [[nodiscard]] Matrix15d considered() const;
-  /// What the doubtful part has said, after it has corrected the iterate; nothing on numerical failure.
-  [[nodiscard]] std::optional<PoseInformation> use_doubtful(FilterState& iterate) const;
+  /// Steps along the degenerate directions: what certain points say there, then what little the rest does. The
+  /// information of both; nothing on numerical failure.
+  [[nodiscard]] std::optional<Matrix6d> step_along_degenerate(FilterState& iterate, SalientPart& salient);
+  [[nodiscard]] SalientPart find_salient(const FilterState& at);
   [[nodiscard]] bool iterate(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
                              const LocalMap& map, MatchResult& result);
   [[nodiscard]] ScanReason judge(const FilterState& predicted, const Assessment& assessment,
@@ -88,9 +97,15 @@ class ScanMatcher {
   BlindDirections blind_directions_;
   double map_noise_ = 1.0;  ///< factor on the variance of a point for the map's own errors
   double mean_range_ = 1.0;
-  double mean_map_scan_ = 0.0;  ///< number of the scan that a met map point comes from
+  double mean_map_scan_ = 0.0;    ///< number of the scan that a met map point comes from
+  double pooled_variance_ = 0.0;  ///< see is_salient
+  int salient_since_ = 0;
+  double salient_share_ = 0.0;  ///< of the matched points, running mean over half a second of scans
 
-  friend void transfer(auto& io, FieldsOf<ScanMatcher> auto& matcher) { transfer(io, matcher.blind_directions_); }
+  friend void transfer(auto& io, FieldsOf<ScanMatcher> auto& matcher) {
+    transfer(io, matcher.blind_directions_);
+    io.number(matcher.salient_share_);
+  }
 };
 
 }  // namespace ignis

@@ -53,6 +53,27 @@ TEST(Degeneracy, ABlindDirectionIsCutOutOfTheReliablePartAndItsTrueShareIsDoubtf
   EXPECT_LT((analysis.blind_part - Vector6d::Unit(5) * Vector6d::Unit(5).transpose()).norm(), 1e-12);
 }
 
+TEST(Degeneracy, ShiftsAreTheDegenerateDirectionsThatAreMostlyPosition) {
+  DegeneracyAnalysis analysis;
+  Vector6d turn_and_shift = Vector6d::Zero();
+  turn_and_shift[2] = 0.6;
+  turn_and_shift[3] = 0.8;
+  analysis.degenerate = {Vector6d::Unit(1), turn_and_shift};
+  const std::vector<Eigen::Vector3d> axes = blind_shifts(analysis);
+  ASSERT_EQ(axes.size(), 1U);
+  EXPECT_EQ(axes[0], Eigen::Vector3d::UnitX());
+}
+
+TEST(Degeneracy, AShiftThatIsKnownOtherwiseIsNotReported) {
+  DegeneracyAnalysis analysis;
+  analysis.degenerate = {Vector6d::Unit(1), Vector6d::Unit(3), Vector6d::Unit(5)};
+  analysis.degenerate_directions = 3;
+  const Eigen::Matrix3d information = Eigen::Vector3d(99.0, 0.0, 101.0).asDiagonal();
+  const DegeneracyAnalysis open = without_known_shifts(analysis, information, 0.1);
+  EXPECT_EQ(open.degenerate_directions, 2);
+  EXPECT_EQ(describe(open), "turn about body (0.00, 1.00, 0.00); position along odom (1.00, 0.00, 0.00)");
+}
+
 TEST(Degeneracy, NamesADirectionByItsLargerPartAndWithoutASign) {
   DegeneracyAnalysis analysis;
   EXPECT_EQ(describe(analysis), "");

@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include <Eigen/Geometry>
+
+#include "common/config_json.h"
+#include "common/loop_gates.h"
 
 namespace ignis::test {
 
@@ -29,19 +33,12 @@ LioRun run_lio(const FrontendConfig& config, const Drive& drive, double scan_del
 }
 
 FrontendConfig tuned_config() {
-  FrontendConfig config;
-  config.voxel_size_m = 0.1;
-  config.match_radius_m = 0.15;
-  config.wide_match_radius_m = 0.3;
-  config.degeneracy_signal_to_noise = 2.0;
-  config.map_average_points = 1000;
-  config.min_plane_points = 4;
-  config.max_curvature = 0.3;
-  config.max_centroid_offset = 0.6;
-  config.max_surface_roughness = 0.05;
-  config.accel_bias_walk = 0.01;
-  config.accel_bias_sigma = 0.06;
-  return config;
+  config::Json section =
+      config::read_json(std::filesystem::path(IGNIS_CONFIG_DIR) / "ignis8_tuned.json").at("frontend");
+  // The reference's one table holds the loop closer's gates too.
+  const config::Json loop_gates = config::Printer::print(LoopGates());
+  for (const auto& gate : loop_gates.items()) section.erase(gate.key());
+  return config::load<FrontendConfig>(section);
 }
 
 double drive_seconds(const Drive& drive, Utime utime) { return seconds_between(drive.imu.front().utime, utime); }

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "common/so3.h"
 
@@ -64,6 +67,63 @@ TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
   EXPECT_NEAR(published(drift, kStart)(kAttitude, kAttitude), 2.0 * 1e-6 / 10.0, 1e-12);
   drift.add_scan(covariance, kStart, 0.0);
   EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 * 1.1, 1e-12) << "at least one scan old";
+}
+
+/// Published variance along Z of a drive that was known to 1 cm at scan 10, 1 m at scan 110 and 2 m at scan 210.
+struct Drifted : ::testing::Test {
+  Drifted() {
+    drift.begin(Eigen::Matrix3d::Zero(), kStart);
+    drift.remember(10, 1e-4 * Eigen::Matrix3d::Identity());
+    drift.remember(110, Eigen::Matrix3d::Identity());
+    drift.remember(210, 4.0 * Eigen::Matrix3d::Identity());
+  }
+  [[nodiscard]] Eigen::Vector3d variances() const { return published(drift, kStart).diagonal().segment<3>(kPosition); }
+
+  MapDrift drift{1.0};
+  const std::array<Eigen::Vector3d, 1> along{Eigen::Vector3d::UnitZ()};
+};
+
+TEST_F(Drifted, APoseHeldByAPlaneIsKnownNoBetterThanWhenThePlaneWasMapped) {
+  drift.hold_to(110.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 1.0, 1e-12);
+  EXPECT_NEAR(variances().x(), 0.0, 1e-12) << "other directions are held by all planes";
+}
+
+TEST_F(Drifted, AnOldPlaneBringsBackWhatWasKnownThen) {
+  drift.hold_to(9.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 1e-4, 1e-12);
+}
+
+TEST_F(Drifted, WhatIsKnownWorseAlreadyStays) {
+  drift.hold_to(110.0, along, kStart);
+  drift.hold_to(10.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 1.0, 1e-12);
+}
+
+TEST_F(Drifted, BetweenTwoRememberedScansTheLaterCounts) {
+  drift.hold_to(111.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 4.0, 1e-12);
+}
+
+TEST_F(Drifted, APlaneOfTheNewestScansIsHeldToTheNewestThatIsRemembered) {
+  drift.hold_to(500.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 4.0, 1e-12);
+}
+
+TEST_F(Drifted, ANewMapForgetsThePlacesOfTheOld) {
+  drift.remember(1, 0.25 * Eigen::Matrix3d::Identity());
+  drift.hold_to(300.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 0.25, 1e-12);
+}
+
+TEST(MapDrift, RemembersTheLastMinutesOnly) {
+  MapDrift drift(1.0);
+  drift.begin(Eigen::Matrix3d::Zero(), kStart);
+  for (int scan = 0; scan < 20'000; ++scan) drift.remember(scan, scan * Eigen::Matrix3d::Identity());
+  std::vector<std::byte> bytes;
+  ByteWriter writer(bytes);
+  transfer(writer, std::as_const(drift));
+  EXPECT_LT(bytes.size(), 40'000U);
 }
 
 }  // namespace

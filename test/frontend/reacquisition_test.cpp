@@ -6,53 +6,37 @@
 #include <random>
 
 #include "common/so3.h"
-#include "frontend/lio_runner.h"
 #include "frontend/scan_matcher.h"
+#include "frontend/standing_sensor.h"
 
 namespace ignis {
 namespace {
 
-/// A second of scans of the furnished hall from a standing sensor, as a map and as the next scan.
-struct Standing {
-  FrontendConfig config = test::tuned_config();
-  LocalMap map{config};
-  std::vector<Eigen::Vector3f> scan;
+using test::StandingSensor;
 
-  Standing() {
-    const test::Drive drive =
-        test::simulate(test::furnished_hall(), test::straight_drive(10.0, 0.0), 2.0, test::Sensors{}, 3);
-    for (std::size_t i = 0; i < 30; ++i) {
-      std::vector<Eigen::Vector3f> points;
-      for (const ScanPoint& point : drive.scans[i].points) points.push_back(point.position);
-      if (i < 29) map.insert(points, Pose(), true);
-      if (i >= 28) scan.insert(scan.end(), points.begin(), points.end());
-    }
-  }
-
-  [[nodiscard]] static FilterState predicted(const Pose& pose, double position_sigma, double attitude_sigma) {
-    FilterState filter;
-    filter.nominal.T_odom_body = pose;
-    filter.covariance.setIdentity();
-    filter.covariance.diagonal().segment<3>(kAttitude).setConstant(attitude_sigma * attitude_sigma);
-    filter.covariance.diagonal().segment<3>(kPosition).setConstant(position_sigma * position_sigma);
-    return filter;
-  }
-};
+FilterState predicted_at(const Pose& pose, double position_sigma, double attitude_sigma) {
+  FilterState filter;
+  filter.nominal.T_odom_body = pose;
+  filter.covariance.setIdentity();
+  filter.covariance.diagonal().segment<3>(kAttitude).setConstant(attitude_sigma * attitude_sigma);
+  filter.covariance.diagonal().segment<3>(kPosition).setConstant(position_sigma * position_sigma);
+  return filter;
+}
 
 TEST(Reacquisition, FindsThePlaceThatTheMatcherAloneMisses) {
-  const Standing standing;
+  const StandingSensor standing;
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   int missed = 0;
   for (int trial = 0; trial < 20; ++trial) {
     const Eigen::Vector3d shift = 0.25 * Eigen::Vector3d(normal(random), 0.3 * normal(random), normal(random));
     const Pose wrong{so3::exp(0.01 * Eigen::Vector3d(normal(random), normal(random), normal(random))), shift};
-    const FilterState predicted = Standing::predicted(wrong, 0.25, 0.01);
-    const Pose found = reacquire(predicted, standing.scan, standing.map, standing.config);
+    const FilterState predicted = predicted_at(wrong, 0.25, 0.01);
+    const Pose found = reacquire(predicted, standing.newest_two, standing.map, standing.config);
     EXPECT_LT(found.translation.norm(), 0.05) << "from " << shift.transpose();
 
     const auto match = [&](const Pose& start) {
-      return ScanMatcher(standing.config).match(predicted, start, standing.scan, standing.map);
+      return ScanMatcher(standing.config).match(predicted, start, standing.newest_two, standing.map);
     };
     const MatchResult with = match(found);
     EXPECT_TRUE(with.stats.applied());
@@ -64,17 +48,17 @@ TEST(Reacquisition, FindsThePlaceThatTheMatcherAloneMisses) {
 }
 
 TEST(Reacquisition, LeavesACertainPredictionAlone) {
-  const Standing standing;
+  const StandingSensor standing;
   const Pose near{Eigen::Quaterniond::Identity(), {0.03, 0.0, 0.02}};
-  const Pose start = reacquire(Standing::predicted(near, 0.02, 0.001), standing.scan, standing.map, standing.config);
+  const Pose start = reacquire(predicted_at(near, 0.02, 0.001), standing.newest_two, standing.map, standing.config);
   EXPECT_EQ(start.translation, near.translation);
 }
 
 TEST(Reacquisition, StaysWithThePredictionWhereThereIsNoMap) {
-  const Standing standing;
+  const StandingSensor standing;
   const LocalMap empty(standing.config);
   const Pose pose{Eigen::Quaterniond::Identity(), {1.0, 0.0, 2.0}};
-  const Pose start = reacquire(Standing::predicted(pose, 1.0, 0.1), standing.scan, empty, standing.config);
+  const Pose start = reacquire(predicted_at(pose, 1.0, 0.1), standing.newest_two, empty, standing.config);
   EXPECT_EQ(start.translation, pose.translation);
 }
 

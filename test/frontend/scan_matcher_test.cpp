@@ -5,32 +5,21 @@
 
 #include <gtest/gtest.h>
 
-#include "frontend/lio_runner.h"
+#include "frontend/standing_sensor.h"
 
 namespace ignis {
 namespace {
 
-/// A second of scans of the furnished hall from a standing sensor as a map, and one more to match.
 class ScanMatcherTest : public ::testing::Test {
  protected:
-  ScanMatcherTest() {
-    const test::Drive drive =
-        test::simulate(test::furnished_hall(), test::straight_drive(10.0, 0.0), 2.0, test::Sensors{}, 3);
-    for (std::size_t i = 0; i < 30; ++i) {
-      scan_.clear();
-      for (const ScanPoint& point : drive.scans[i].points) scan_.push_back(point.position);
-      if (i < 29) map_.insert(scan_, Pose(), true);
-    }
-    predicted_.covariance = 1e-4 * Matrix15d::Identity();
-  }
+  ScanMatcherTest() { predicted_.covariance = 1e-4 * Matrix15d::Identity(); }
 
   [[nodiscard]] MatchResult match() const {
-    return ScanMatcher(config_).match(predicted_, predicted_.nominal.T_odom_body, scan_, map_);
+    return ScanMatcher(config_).match(predicted_, predicted_.nominal.T_odom_body, standing_.newest, standing_.map);
   }
 
-  FrontendConfig config_ = test::tuned_config();
-  LocalMap map_{config_};
-  std::vector<Eigen::Vector3f> scan_;
+  test::StandingSensor standing_;
+  FrontendConfig config_ = standing_.config;
   FilterState predicted_;
 };
 
