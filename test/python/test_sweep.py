@@ -129,12 +129,17 @@ def test_bad_options_are_one_sentence(more: list[str], said: str, arguments: lis
 
 
 def test_commas_inside_of_a_value_belong_to_it() -> None:
-    axes = parse_axes(["extrinsics.t=[0,1,2],[3,4,5]", 'frontend.start="a,b",rest'])
-    assert axes == {"extrinsics.t": ["[0,1,2]", "[3,4,5]"], "frontend.start": ['"a,b"', "rest"]}
+    axes = parse_axes(["map.t=[0,1,2],[3,4,5]", 'frontend.start="a,b",rest'])
+    assert axes == {"map.t": ["[0,1,2]", "[3,4,5]"], "frontend.start": ['"a,b"', "rest"]}
     assert combinations({}) == [()]
     assert len(combinations(axes)) == 4
     with pytest.raises(InputError):
         parse_axes(["frontend.a="])
+
+
+def test_mounts_are_refused_because_logs_are_in_the_body_frame_already() -> None:
+    with pytest.raises(InputError, match=r"extrinsics\.lidar\.yaw_deg=1,2: logs are in the body frame"):
+        parse_axes(["frontend.voxel_size_m=0.1", "extrinsics.lidar.yaw_deg=1,2"])
 
 
 def test_rows_survive_as_json(arguments: list[str], tmp_path: Path) -> None:

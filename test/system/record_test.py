@@ -98,10 +98,15 @@ def test_the_replay_equals_the_live_run_bit_for_bit_up_to_the_first_drop(live: L
     report = replayed(live, tmp_path / "run")
     agreement, drop = report["live"], report["input"]["first_drop"]
     assert agreement["recorded_scans"] > 0.9 * DRIVE_SECONDS * 20 and agreement["first_sequence"] == 0
+    graph = {name: channel for name, channel in agreement["graph"].items() if name != "first_command_s"}
+    assert graph["keyframes"]["recorded"] >= 4 and graph["smoothed_states"]["recorded"] > 100
+    assert graph["revisions"]["recorded"] > graph["keyframes"]["recorded"], "full sets come as well"
+    firsts = [agreement["first_unequal_s"], *(channel["first_unequal_s"] for channel in graph.values())]
     if drop is None:
         assert agreement["equal_scans"] == agreement["recorded_scans"], agreement
+        assert all(channel["equal"] == channel["recorded"] for channel in graph.values()), graph
     else:  # A busy machine loses datagrams; then nothing may differ before the place that the replay names.
-        assert agreement["first_unequal_s"] is None or agreement["first_unequal_s"] >= drop["s"], (agreement, drop)
+        assert all(first is None or first >= drop["s"] for first in firsts), (agreement, drop)
 
 
 def test_a_gap_on_the_bus_is_warned_of(private_network: None, tmp_path: Path) -> None:
