@@ -97,7 +97,11 @@ void ReplayInput::index_scan(const messages::LogEvent& event) {
 void ReplayInput::index_health(const messages::LogEvent& event) {
   health_t health;
   // Another version of HEALTH says nothing about the measurements: no damage.
-  if (!inventory_.first_drop && messages::decode_checked(event.data, health)) inventory_.first_drop = drop_of(health);
+  if (inventory_.first_drop || !messages::decode_checked(event.data, health) || health.process != "lio_frontend")
+    return;
+  const std::string loss = loss_in(health);
+  if (!loss.empty()) inventory_.first_drop = RecordedDrop{newest_health_.value_or(health.utime), loss};
+  newest_health_ = health.utime;
 }
 
 void ReplayInput::sort_entries() {
@@ -128,18 +132,23 @@ void ReplayInput::count_missing() {
   runtime::SequenceTracker scan_sequence;
   messages::PartAssembler<Entry> assembler;
   std::optional<RecordedDrop> gap;
-  const auto missed = [&](Utime utime, std::int64_t count, const char* what) {
-    if (count > 0 && !gap) gap = RecordedDrop{utime, std::format("{} {} missing in the log", count, what)};
+  // Per channel, of the message ahead: what is missing comes behind it.
+  Utime last_imu = entries_.front().utime;
+  Utime last_scan = entries_.front().utime;
+  const auto missed = [&](Utime last, std::int64_t count, const char* what) {
+    if (count > 0) gap = earlier(gap, RecordedDrop{last, std::format("{} {} missing in the log", count, what)});
     return count;
   };
   for (const Entry& entry : entries_) {
     if (entry.is_scan) {
-      inventory_.missing_scans += missed(entry.utime, scan_sequence.observe(entry.sequence), "of L1_SCAN");
+      inventory_.missing_scans += missed(last_scan, scan_sequence.observe(entry.sequence), "of L1_SCAN");
       const std::int64_t incomplete = assembler.incomplete();
       (void)assembler.add(entry);
-      missed(entry.utime, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
+      missed(last_scan, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
+      last_scan = entry.utime;
     } else {
-      inventory_.missing_imu += missed(entry.utime, imu_sequence.observe(entry.sequence), "of L1_IMU");
+      inventory_.missing_imu += missed(last_imu, imu_sequence.observe(entry.sequence), "of L1_IMU");
+      last_imu = entry.utime;
     }
   }
   inventory_.incomplete_scans = assembler.incomplete();

@@ -78,6 +78,7 @@ class ReplayInput {
   LogInventory inventory_;
   std::vector<Entry> entries_;
   RecordedResults live_results_;
+  std::optional<Utime> newest_health_;  // [us] of the live front end, while it had lost nothing
   Trajectory ground_truth_;
 };
 
