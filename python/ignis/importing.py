@@ -55,7 +55,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 def detect(path: Path) -> str:
     """The kind of a recording: kitti, bag, ouster, capture or lcm. Refuses everything else."""
     if not path.exists():
-        raise InputError(f"{path} does not exist; give {_KINDS}")
+        raise InputError(f"{path} does not exist")
     if path.is_dir():
         if rosbag.is_bag(path):
             return "bag"
