@@ -55,7 +55,7 @@ ReplayInput::ReplayInput(const std::filesystem::path& file) : log_(file) {
 
 void ReplayInput::require(const std::filesystem::path& file, const char* channel) const {
   if (inventory_.used.contains(channel)) return;
-  throw std::runtime_error(std::format("{}: holds no usable message on {}, so there is nothing to replay. It holds:{}",
+  throw std::runtime_error(std::format("{}: holds no usable message on {}, so there is nothing to replay.\nIt holds:{}",
                                        file.string(), channel, listing_.text()));
 }
 

@@ -243,6 +243,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
                     {"scan_p50_ms_by_quarter", medians_by_quarter(result.scan_times_ms)},
                     {"frontend", timer_json(pipeline.frontend_timer())},
                     {"backend", timer_json(pipeline.backend_timer())},
+                    {"batch_optimum", timer_json(pipeline.batch_timer())},
                     {"map", timer_json(pipeline.map_timer())}};
   return json;
 }

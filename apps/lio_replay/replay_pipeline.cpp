@@ -77,7 +77,7 @@ void ReplayPipeline::adopt_due_optimum() {
   if (!schedule_.adoption_due(smoother_.stats().keyframes)) return;
   schedule_.end();
   const int swaps = smoother_.stats().shadow_swaps;
-  const SmootherUpdate update = smoother_.adopt(solve(problem_));
+  const SmootherUpdate update = smoother_.adopt(batch_timer_.time([&] { return solve(problem_); }));
   if (smoother_.stats().shadow_swaps != swaps) publish(update);
 }
 
@@ -112,7 +112,7 @@ void ReplayPipeline::rebuild_map() {
 
 /// Places the poses of this session where its graph has them in the end.
 void ReplayPipeline::settle_graph() {
-  result_.optimum = solve(smoother_.shadow_problem());
+  result_.optimum = batch_timer_.time([&] { return solve(smoother_.shadow_problem()); });
   correct_map(smoother_.adopt(result_.optimum));
   std::vector<KeyframeCorrection> corrections;
   for (const KeyframePose& pose : smoother_.all_poses()) {

@@ -61,6 +61,7 @@ class ReplayPipeline {
 
   [[nodiscard]] const StageTimer& frontend_timer() const { return frontend_timer_; }
   [[nodiscard]] const StageTimer& backend_timer() const { return backend_timer_; }
+  [[nodiscard]] const StageTimer& batch_timer() const { return batch_timer_; }
   [[nodiscard]] const StageTimer& map_timer() const { return map_timer_; }
 
  private:
@@ -88,6 +89,7 @@ class ReplayPipeline {
   ReplayResult result_;
   StageTimer frontend_timer_;
   StageTimer backend_timer_;
+  StageTimer batch_timer_;  // of the batch optimum, which the live back end computes on a second thread
   StageTimer map_timer_;
 };
 

@@ -14,6 +14,7 @@ import pytest
 
 from ignis import results
 from ignis.compare import comparison
+from ignis.log_config import recorded_config
 from ignis.pipeline import Pipeline, effective_config
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
@@ -136,6 +137,7 @@ def test_interrupted_demo_ends_every_process_and_keeps_what_it_computed(tmp_path
     output, _ = demo.communicate(timeout=60)
     assert "Interrupted" in output
     assert (folder / "run.lcmlog").stat().st_size > 100_000
+    assert recorded_config(folder / "run.lcmlog") == json.loads((folder / "config.json").read_text())
     assert (folder / "eskf.tum").exists()
     assert not _running() - before
 

@@ -218,7 +218,7 @@ def _timing(run: Run) -> str:
             f"{timing[name]['p50_ms']:.3f}",
             f"{timing[name]['p99_ms']:.3f}",
         )
-        for name in ("frontend", "backend", "map")
+        for name in ("frontend", "backend", "batch_optimum", "map")
     ]
     chart = ""
     if run.timing is not None and len(run.timing["utime"]):
