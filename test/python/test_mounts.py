@@ -113,7 +113,7 @@ def test_changes_reach_the_front_end_that_checks_them(tmp_path: Path, monkeypatc
     program.write_text('#!/bin/sh\ntest "$3 $4" = "--set extrinsics.imu.yaw_deg=7" || exit 2\n'
                        'echo \'{"extrinsics": {"lidar": {}, "imu": {"yaw_deg": 7}}}\'\n')  # fmt: skip
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    with pytest.raises(InputError, match="run ./ignis build first"):
+    with pytest.raises(InputError, match=r"run \./ignis build first"):
         read_extrinsics(config, ["extrinsics.imu.yaw_deg=7"])
     monkeypatch.setenv("IGNIS_BUILD", str(tmp_path))
     assert read_extrinsics(config, ["extrinsics.imu.yaw_deg=7"]).imu.yaw_deg == 7
