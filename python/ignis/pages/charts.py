@@ -55,7 +55,7 @@ def _line(label: str) -> dict[str, Any]:
     """The wider one lies below: where two estimates agree, both are seen."""
     if label == TRUTH:
         return {"lw": 5.0, "alpha": 0.3}
-    return {"lw": 2.8} if label == ESKF else {"lw": 1.2}
+    return {"lw": 2.2} if label == ESKF else {"lw": 1.0}
 
 
 def from_above(
