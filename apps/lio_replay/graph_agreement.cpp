@@ -11,8 +11,8 @@
 namespace ignis {
 namespace {
 
-/// A state may leave before the revision whose keyframe has its stamp, or one or two later when the back end is busy.
-constexpr int kCorrectionsTried = 4;
+/// A back end that was started late or is busy moves states by corrections of keyframes long ago.
+constexpr int kCorrectionsTried = 200;
 
 }  // namespace
 
@@ -82,9 +82,11 @@ bool GraphComparison::is_moved(std::span<const std::byte> smoothed, std::span<co
   state_t sent;
   state_t state;
   if (!messages::decode_checked(smoothed, sent) || !messages::decode_checked(odometry, state)) return false;
+  const NavState before = messages::from_message(state);
+  const Pose after = messages::from_message(sent).T_odom_body;
   const auto is_by = [&](const Pose& T_map_odom) {
-    const state_t moved = messages::smoothed_state(messages::from_message(state), state.session, T_map_odom);
-    return is_as_sent(moved, smoothed, sent);
+    if ((T_map_odom * before.T_odom_body).translation != after.translation) return false;  // most: not worth encoding
+    return is_as_sent(messages::smoothed_state(before, state.session, T_map_odom), smoothed, sent);
   };
   int tried = 0;
   for (const Correction& correction : corrections_ | std::views::reverse) {

@@ -25,7 +25,7 @@ struct GraphAgreement {
 /// Compares what the live processes published with what the replay would publish, every field but the running number.
 /// The full sets of the live back end leave by the clock, the states when they come: of both it is the content that
 /// counts, given the revision that was the newest. LIO_STATE between two scans depends on when the scan arrived; a
-/// recorded SMOOTHED_STATE has to be the recorded LIO_STATE, moved by one of the replay's newest corrections.
+/// recorded SMOOTHED_STATE has to be the recorded LIO_STATE, moved by one of the replay's corrections up to then.
 class GraphComparison : public GraphListener {
  public:
   explicit GraphComparison(const RecordedResults& recorded);
