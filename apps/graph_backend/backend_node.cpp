@@ -53,7 +53,6 @@ BackendNode::BackendNode(const runtime::Application& application, const std::fil
 void BackendNode::spin_once() {
   link_.handle(kPollMs);
   request_missing_keyframes();
-  follow_shadow();
   graph_.maintain();
   const bool has_keyframes = !graph_.smoother().all_poses().empty();
   if (has_keyframes && std::chrono::steady_clock::now() - last_full_ > kFullPeriod) publish_full_set();
@@ -84,6 +83,7 @@ bool BackendNode::refuse_damaged(const Keyframe& keyframe) {
 
 void BackendNode::begin_session(std::int32_t session) {
   graph_.begin_session(session);
+  schedule_ = {};
   inbox_.clear();
   T_map_odom_ = Pose{};
   last_update_ = {};
@@ -94,6 +94,7 @@ void BackendNode::begin_session(std::int32_t session) {
 
 void BackendNode::add_waiting_keyframes() {
   while (std::optional<Keyframe> keyframe = inbox_.take(graph_.smoother().expected_id())) {
+    adopt_due_optimum();
     const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.add_keyframe(*keyframe); });
     newest_utime_ = std::max(newest_utime_, keyframe->state.utime);
     refusal_ = update.accepted() ? "" : std::format("keyframe {} refused: {}", keyframe->id, update.reason);
@@ -114,17 +115,21 @@ void BackendNode::on_command(const graph_command_t& command) {
   publish_update(answered(update, command));
 }
 
+void BackendNode::adopt_due_optimum() {
+  if (!schedule_.adoption_due(graph_.smoother().stats().keyframes)) return;
+  schedule_.end();
+  const ShadowOptimum optimum = optimum_.get();
+  const int swaps = graph_.smoother().stats().shadow_swaps;
+  const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(optimum); });
+  if (graph_.smoother().stats().shadow_swaps != swaps) publish_update(update);
+}
+
 /// After loops have entered or left, a batch solve in the background tells how far the incremental solution is from the
 /// optimum.
-void BackendNode::follow_shadow() {
-  if (const std::optional<ShadowOptimum> optimum = shadow_.take()) {
-    const int swaps = graph_.smoother().stats().shadow_swaps;
-    const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(*optimum); });
-    if (graph_.smoother().stats().shadow_swaps != swaps) publish_update(update);
-  }
-  if (loop_changes_ == shadowed_loops_changes_ || !shadow_.idle()) return;
-  shadowed_loops_changes_ = loop_changes_;
-  shadow_.start(graph_.shadow_problem());
+void BackendNode::begin_due_optimum() {
+  if (!schedule_.begin_due()) return;
+  schedule_.begin(graph_.smoother().stats().keyframes);
+  optimum_ = std::async(std::launch::async, solve, graph_.shadow_problem());
 }
 
 void BackendNode::publish_update(const SmootherUpdate& update) {
@@ -133,28 +138,16 @@ void BackendNode::publish_update(const SmootherUpdate& update) {
   publish_revision(update, false);
   if (update.loop) publish_loop(*update.loop);
   for (const LoopResult& changed : update.changed) publish_loop(changed);
-  loop_changes_ += static_cast<int>(update.changed.size()) + (update.loop && update.loop->accepted() ? 1 : 0);
+  schedule_.note(update);
+  begin_due_optimum();
 }
 
-void BackendNode::publish_full_set() {
-  SmootherUpdate everything = last_update_;
-  everything.moved = graph_.smoother().all_poses();
-  publish_revision(everything, true);
-}
+void BackendNode::publish_full_set() { publish_revision(last_update_, true); }
 
 void BackendNode::publish_revision(const SmootherUpdate& update, bool full) {
   if (full) last_full_ = std::chrono::steady_clock::now();
-  const Smoother& smoother = graph_.smoother();
-  messages::GraphRevision revision;
-  revision.utime = newest_utime_;
-  revision.session = graph_.session();
-  revision.revision = smoother.revision();
-  revision.full = full;
-  revision.keyframes = smoother.stats().keyframes;
-  revision.newest_id = smoother.expected_id() - 1;
-  revision.T_map_odom = smoother.T_map_odom();
-  revision.covariance = update.covariance;
-  revision.poses = update.moved;
+  messages::GraphRevision revision = messages::revision_of(graph_.smoother(), update, graph_.session(), newest_utime_);
+  if (full) messages::list_all(revision, graph_.smoother());
   for (smoothed_keyframes_t& message : messages::to_messages(revision)) {
     message.sequence = revision_sequence_;
     link_.publish(channels::kSmoothedKeyframes, message);
@@ -186,9 +179,7 @@ void BackendNode::on_state(const state_t& message) {
   if (!is_next_state(state)) return;
   if (state.utime < last_smoothed_utime_ + kSmoothedStatePeriod) return;
   last_smoothed_utime_ = state.utime;
-  state.T_odom_body = T_map_odom_ * state.T_odom_body;
-  state.v_odom = T_map_odom_.rotation * state.v_odom;
-  state_t smoothed = messages::to_message(state, graph_.session(), "map");
+  state_t smoothed = messages::smoothed_state(state, graph_.session(), T_map_odom_);
   smoothed.sequence = state_sequence_++;
   link_.publish(channels::kSmoothedState, smoothed);
 }

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <filesystem>
+#include <future>
 #include <optional>
 
+#include "backend/shadow_schedule.h"
 #include "common/leap_guard.h"
 #include "keyframe_inbox.h"
 #include "lasting_graph.h"
@@ -11,11 +13,10 @@
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
 #include "runtime/lcm_link.h"
-#include "shadow_worker.h"
 
 namespace ignis {
 
-/// Wires the smoother to the bus. One thread, and a second one for the batch solution beside it.
+/// Wires the smoother to the bus. One thread, and a second one for each batch solution beside it.
 class BackendNode {
  public:
   /// `journal_folder` may be empty: then a killed process begins anew.
@@ -33,7 +34,8 @@ class BackendNode {
   [[nodiscard]] bool is_next_state(const NavState& state);
   void begin_session(std::int32_t session);
   void request_missing_keyframes();
-  void follow_shadow();
+  void adopt_due_optimum();
+  void begin_due_optimum();
   void publish_update(const SmootherUpdate& update);
   void publish_full_set();
   void publish_revision(const SmootherUpdate& update, bool full);
@@ -47,7 +49,8 @@ class BackendNode {
   messages::KeyframeAssembler assembler_;
   LastingGraph graph_;
   KeyframeInbox inbox_;
-  ShadowWorker shadow_;
+  ShadowSchedule schedule_;
+  std::future<ShadowOptimum> optimum_;  // waits in its destructor, and when it is replaced, for the solve under way
   Pose T_map_odom_;
   Utime newest_utime_ = 0;
   std::optional<Utime> newest_state_;  // [us] of LIO_STATE
@@ -55,9 +58,7 @@ class BackendNode {
   Utime last_smoothed_utime_ = 0;
   std::chrono::steady_clock::time_point last_full_{};
   SmootherUpdate last_update_;
-  std::string refusal_;             // of the newest keyframe; empty when it was accepted
-  int shadowed_loops_changes_ = 0;  // loop_changes_ when the newest batch solve began
-  int loop_changes_ = 0;            // loops that entered or left the graph
+  std::string refusal_;  // of the newest keyframe; empty when it was accepted
   std::int32_t revision_sequence_ = 0;
   std::int32_t loop_sequence_ = 0;
   std::int32_t state_sequence_ = 0;

@@ -79,7 +79,9 @@ void FrontendNode::on_imu(const imu_t& message) {
     ++imu_counts_->rejected;
   }
   publish(result.scans, milliseconds);
-  if (result.state) publish_state(*result.state, nullptr);
+  if (!result.state) return;
+  publish_state(*result.state, owed_covariance_ ? &*owed_covariance_ : nullptr);
+  owed_covariance_.reset();
 }
 
 void FrontendNode::on_scan_part(const scan_t& part) {
@@ -96,6 +98,7 @@ void FrontendNode::publish(std::span<const ScanResult> scans, double millisecond
 }
 
 void FrontendNode::publish_state(const NavState& state, const Matrix15d* covariance) {
+  told_until_ = {lio_.session(), state.utime};
   state_t message = messages::to_message(state, lio_.session(), "odom", covariance);
   message.sequence = state_sequence_++;
   link_.publish(channels::kState, message);
@@ -107,7 +110,12 @@ void FrontendNode::publish_scan(const ScanResult& scan, double milliseconds) {
   stats.time_spent_ms = milliseconds;
   link_.publish(channels::kScanStats, stats);
   if (!scan.has_state) return;
-  publish_state(scan.state, &scan.covariance);
+  // Stamps only increase. A scan that came after later inertial samples has corrected the state of the next one.
+  if (told_until_ < std::pair(lio_.session(), scan.state.utime)) {
+    publish_state(scan.state, &scan.covariance);
+  } else {
+    owed_covariance_ = scan.covariance;
+  }
   messages::PosedCloud cloud{.utime = scan.state.utime,
                              .sequence = cloud_sequence_++,
                              .session = lio_.session(),

@@ -4,8 +4,10 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "checkpoint_folder.h"
 #include "frontend/lio.h"
@@ -53,6 +55,8 @@ class FrontendNode {
   Utime last_checkpoint_ = 0;        // [us] scan time
   RateLimit resends_{100.0, 100.0};  // keyframes a second; back end and map together ask for at most 85
   Utime newest_utime_ = 0;
+  std::pair<std::int32_t, Utime> told_until_{-1, 0};  // session and stamp of the newest LIO_STATE
+  std::optional<Matrix15d> owed_covariance_;          // of a scan that came late, for the next LIO_STATE
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;
   std::int32_t cloud_sequence_ = 0;

@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "channel_agreement.h"
 #include "messages/length_check.h"
 #include "messages/odometry_messages.h"
 
@@ -12,12 +13,6 @@ namespace ignis {
 namespace {
 
 using Key = std::pair<Utime, std::int32_t>;  // end of the scan, its running number
-
-std::vector<std::byte> encoded(const scan_stats_t& message) {
-  std::vector<std::byte> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
 
 /// The message that the live front end would have sent for a replayed scan; number and time spent are the sender's.
 scan_stats_t as_sent(const ScanStats& stats, const scan_stats_t& live) {

@@ -11,6 +11,7 @@
 #include <memory>
 #include <thread>
 
+#include "graph_agreement.h"
 #include "replay_output.h"
 #include "replay_progress.h"
 #include "runtime/stop_signal.h"
@@ -78,7 +79,8 @@ runtime::ExitCode replay(const runtime::Application& application, const Options&
   const auto began = std::chrono::steady_clock::now();
   const std::unique_ptr<ReplayInput> input = open_log(options.log);
   make_folder(options.folder);
-  ReplayPipeline pipeline(application.config, !options.no_loops);
+  GraphComparison graph(input->live_results());
+  ReplayPipeline pipeline(application.config, !options.no_loops, &graph);
   const Utime first = input->inventory().first_utime;
   const Utime last = options.until_s > 0.0 ? std::min(input->inventory().last_utime, first + to_micros(options.until_s))
                                            : input->inventory().last_utime;
@@ -95,7 +97,8 @@ runtime::ExitCode replay(const runtime::Application& application, const Options&
   const ReplayResult result = pipeline.finish();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - began;
   const ReplayTiming timing{.wall_s = wall.count()};
-  const ReplaySource source{options.log, *input, agreement_with_live(input->live_scan_stats(), result.scans)};
+  const ReplaySource source{options.log, *input, agreement_with_live(input->live_results().scan_stats, result.scans),
+                            graph.agreement(result.scans.empty() ? first : result.scans.back().utime)};
   write_results(options.folder, application, source, pipeline, result, timing);
   std::cout << summary(source, result, timing) << std::format("results:    {}\n", options.folder);
   if (result.odometry.empty()) {

@@ -7,17 +7,16 @@
 
 namespace ignis {
 
-std::optional<RecordedDrop> drop_of(const health_t& health) {
-  if (health.process != "lio_frontend") return std::nullopt;
+std::string loss_in(const health_t& health) {
   std::string what;
+  if (health.process != "lio_frontend") return what;
   for (std::size_t i = 0; i < health.channels.size(); ++i) {
     const std::int64_t missed = health.lost[i] + health.rejected[i] + health.queue_drops[i];
     const std::string& channel = health.channels[i];
     if (missed == 0 || (channel != runtime::channels::kImu && channel != runtime::channels::kScan)) continue;
     what += std::format("{}the live lio_frontend missed {} messages of {}", what.empty() ? "" : ", ", missed, channel);
   }
-  if (what.empty()) return std::nullopt;
-  return RecordedDrop{health.utime, what};
+  return what;
 }
 
 }  // namespace ignis

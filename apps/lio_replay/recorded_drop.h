@@ -11,7 +11,7 @@ namespace ignis {
 
 /// Something that a live receiver or the recorder missed. From here on a replay may differ from the live run.
 struct RecordedDrop {
-  Utime utime = 0;   ///< [us] of the first message behind the gap, or of the report that names it
+  Utime utime = 0;   ///< [us] of the last message ahead of the gap, or of the last report that knows nothing of it
   std::string what;  ///< channel and count, in words
 };
 
@@ -21,8 +21,8 @@ struct RecordedDrop {
   return a;
 }
 
-/// What a HEALTH message of the live front end says that it missed of the sensors' channels; nothing when it missed
-/// none. Losses of other processes are mended by asking again and do not change the front end's results.
-[[nodiscard]] std::optional<RecordedDrop> drop_of(const health_t& health);
+/// What a HEALTH message of the live front end says that it missed of the sensors' channels; empty when it missed none,
+/// and for other processes: their losses are mended by asking again and do not change the front end's results.
+[[nodiscard]] std::string loss_in(const health_t& health);
 
 }  // namespace ignis

@@ -17,10 +17,32 @@ namespace {
 
 namespace channels = runtime::channels;
 
+/// Gives back the pages of a log after every so many bytes read.
+class PageRelease {
+ public:
+  explicit PageRelease(const messages::LcmLog& log) : log_(log) {}
+
+  void read(std::size_t bytes) {
+    constexpr std::size_t kStep = std::size_t{64} << 20;
+    read_ += bytes;
+    if (read_ < kStep) return;
+    read_ = 0;
+    log_.release_memory();
+  }
+
+ private:
+  const messages::LcmLog& log_;
+  std::size_t read_ = 0;
+};
+
 }  // namespace
 
 ReplayInput::ReplayInput(const std::filesystem::path& file) : log_(file) {
-  while (const std::optional<messages::LogEvent> event = log_.next()) index(*event);
+  PageRelease pages(log_);
+  while (const std::optional<messages::LogEvent> event = log_.next()) {
+    index(*event);
+    pages.read(event->data.size());
+  }
   inventory_.damaged_bytes = log_.damaged_bytes();
   require(file, channels::kImu);
   require(file, channels::kScan);
@@ -33,39 +55,53 @@ ReplayInput::ReplayInput(const std::filesystem::path& file) : log_(file) {
 
 void ReplayInput::require(const std::filesystem::path& file, const char* channel) const {
   if (inventory_.used.contains(channel)) return;
-  throw std::runtime_error(std::format("{}: holds no usable message on {}, so there is nothing to replay. It holds:{}",
+  throw std::runtime_error(std::format("{}: holds no usable message on {}, so there is nothing to replay.\nIt holds:{}",
                                        file.string(), channel, listing_.text()));
 }
 
 void ReplayInput::index(const messages::LogEvent& event) {
   listing_.add(event);
-  if (event.channel == channels::kImu || event.channel == channels::kScan) {
-    index_measurement(event, event.channel == channels::kScan);
+  if (event.channel == channels::kImu) {
+    index_imu(event);
+  } else if (event.channel == channels::kScan) {
+    index_scan(event);
   } else if (event.channel == channels::kGroundTruth) {
     index_ground_truth(event);
   } else {
-    if (event.channel == channels::kScanStats) live_scan_stats_.push_back(event.data);
+    live_results_.add(event);
     if (event.channel == channels::kHealth) index_health(event);
     ++inventory_.ignored[std::string(event.channel)];
   }
 }
 
-void ReplayInput::index_measurement(const messages::LogEvent& event, bool is_scan) {
+void ReplayInput::index_imu(const messages::LogEvent& event) {
   imu_t imu;
-  scan_t scan;
-  const bool decoded = is_scan ? messages::decode_checked(event.data, scan) : messages::decode_checked(event.data, imu);
-  if (!decoded) {
+  if (!messages::decode_checked(event.data, imu)) {
     ++inventory_.undecodable;
     return;
   }
-  ++inventory_.used[std::string(event.channel)];
-  entries_.push_back({is_scan ? scan.utime : imu.utime, is_scan, event.data});
+  ++inventory_.used[channels::kImu];
+  entries_.push_back({.utime = imu.utime, .sequence = imu.sequence, .is_scan = false, .data = event.data});
+}
+
+void ReplayInput::index_scan(const messages::LogEvent& event) {
+  const std::optional<messages::ScanHead> head = messages::read_scan_head(event.data);
+  if (!head) {
+    ++inventory_.undecodable;
+    return;
+  }
+  ++inventory_.used[channels::kScan];
+  entries_.push_back({head->utime, head->sequence, head->part, head->part_count, true, event.data});
 }
 
 void ReplayInput::index_health(const messages::LogEvent& event) {
   health_t health;
   // Another version of HEALTH says nothing about the measurements: no damage.
-  if (!inventory_.first_drop && messages::decode_checked(event.data, health)) inventory_.first_drop = drop_of(health);
+  if (inventory_.first_drop || !messages::decode_checked(event.data, health) || health.process != "lio_frontend")
+    return;
+  const std::string loss = loss_in(health);
+  if (!loss.empty()) inventory_.first_drop = RecordedDrop{newest_health_.value_or(health.utime), loss};
+  newest_health_ = health.utime;
 }
 
 void ReplayInput::sort_entries() {
@@ -94,22 +130,25 @@ void ReplayInput::index_ground_truth(const messages::LogEvent& event) {
 void ReplayInput::count_missing() {
   runtime::SequenceTracker imu_sequence;
   runtime::SequenceTracker scan_sequence;
-  messages::ScanAssembler assembler;
+  messages::PartAssembler<Entry> assembler;
   std::optional<RecordedDrop> gap;
-  const auto missed = [&](Utime utime, std::int64_t count, const char* what) {
-    if (count > 0 && !gap) gap = RecordedDrop{utime, std::format("{} {} missing in the log", count, what)};
+  // Per channel, of the message ahead: what is missing comes behind it.
+  Utime last_imu = entries_.front().utime;
+  Utime last_scan = entries_.front().utime;
+  const auto missed = [&](Utime last, std::int64_t count, const char* what) {
+    if (count > 0) gap = earlier(gap, RecordedDrop{last, std::format("{} {} missing in the log", count, what)});
     return count;
   };
   for (const Entry& entry : entries_) {
-    imu_t imu;
-    scan_t scan;
-    if (entry.is_scan && messages::decode_checked(entry.data, scan)) {
-      inventory_.missing_scans += missed(entry.utime, scan_sequence.observe(scan.sequence), "of L1_SCAN");
+    if (entry.is_scan) {
+      inventory_.missing_scans += missed(last_scan, scan_sequence.observe(entry.sequence), "of L1_SCAN");
       const std::int64_t incomplete = assembler.incomplete();
-      (void)assembler.add(scan);
-      missed(entry.utime, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
-    } else if (!entry.is_scan && messages::decode_checked(entry.data, imu)) {
-      inventory_.missing_imu += missed(entry.utime, imu_sequence.observe(imu.sequence), "of L1_IMU");
+      (void)assembler.add(entry);
+      missed(last_scan, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
+      last_scan = entry.utime;
+    } else {
+      inventory_.missing_imu += missed(last_imu, imu_sequence.observe(entry.sequence), "of L1_IMU");
+      last_imu = entry.utime;
     }
   }
   inventory_.incomplete_scans = assembler.incomplete();
@@ -120,8 +159,10 @@ void ReplayInput::run(const std::function<void(const ImuSample&)>& on_imu,
                       const std::function<void(const Scan&)>& on_scan,
                       const std::function<bool(Utime)>& proceed) const {
   messages::ScanAssembler assembler;
+  PageRelease pages(log_);
   for (const Entry& entry : entries_) {
     if (!proceed(entry.utime)) return;
+    pages.read(entry.data.size());
     imu_t imu;
     scan_t part;
     if (!entry.is_scan && messages::decode_checked(entry.data, imu)) {

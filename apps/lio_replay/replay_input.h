@@ -15,6 +15,7 @@
 #include "log_listing.h"
 #include "messages/lcm_log.h"
 #include "recorded_drop.h"
+#include "recorded_results.h"
 
 namespace ignis {
 
@@ -36,7 +37,8 @@ struct LogInventory {
 };
 
 /// The measurements of a log, in the order of their own stamps per channel: under load LCM records out of order. The
-/// log stays on disk: it is mapped, and what is kept of a message is its stamp and place.
+/// log stays on disk: it is mapped, what is kept of a message is its head and place, and memory of pages that were read
+/// is given back as the reading goes on.
 class ReplayInput {
  public:
   /// Indexes the log. Throws std::runtime_error when it is no log or holds no IMU or no scans.
@@ -45,8 +47,8 @@ class ReplayInput {
   [[nodiscard]] const LogInventory& inventory() const { return inventory_; }
   [[nodiscard]] const Trajectory& ground_truth() const { return ground_truth_; }
 
-  /// LIO_SCAN_STATS of the live front end, encoded, in the order of the log; none in a log of sensor data alone.
-  [[nodiscard]] const std::vector<std::span<const std::byte>>& live_scan_stats() const { return live_scan_stats_; }
+  /// Of the live run whose log this is; empty in a log of sensor data alone.
+  [[nodiscard]] const RecordedResults& live_results() const { return live_results_; }
 
   /// Calls the handlers with every measurement, in time order; stops early when `proceed` returns false.
   void run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(const Scan&)>& on_scan,
@@ -55,12 +57,16 @@ class ReplayInput {
  private:
   struct Entry {
     Utime utime = 0;
+    std::int32_t sequence = 0;
+    std::int16_t part = 0;
+    std::int16_t part_count = 1;
     bool is_scan = false;
     std::span<const std::byte> data;
   };
 
   void index(const messages::LogEvent& event);
-  void index_measurement(const messages::LogEvent& event, bool is_scan);
+  void index_imu(const messages::LogEvent& event);
+  void index_scan(const messages::LogEvent& event);
   void index_ground_truth(const messages::LogEvent& event);
   void index_health(const messages::LogEvent& event);
   void require(const std::filesystem::path& file, const char* channel) const;
@@ -71,7 +77,8 @@ class ReplayInput {
   LogListing listing_;
   LogInventory inventory_;
   std::vector<Entry> entries_;
-  std::vector<std::span<const std::byte>> live_scan_stats_;
+  RecordedResults live_results_;
+  std::optional<Utime> newest_health_;  // [us] of the live front end, while it had lost nothing
   Trajectory ground_truth_;
 };
 

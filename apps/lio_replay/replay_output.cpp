@@ -170,6 +170,22 @@ Json smoothing_json(const ReplayResult& result) {
           {"expectation", expectation}};
 }
 
+Json channel_json(const ChannelAgreement& channel, Utime first) {
+  Json json = {{"recorded", channel.recorded}, {"equal", channel.equal}, {"first_unequal_s", nullptr}};
+  if (channel.first_unequal) json["first_unequal_s"] = seconds_between(first, *channel.first_unequal);
+  return json;
+}
+
+Json graph_json(const GraphAgreement& graph, const std::optional<Utime>& command, Utime first) {
+  Json json = {{"keyframes", channel_json(graph.keyframes, first)},
+               {"revisions", channel_json(graph.revisions, first)},
+               {"loop_results", channel_json(graph.loops, first)},
+               {"smoothed_states", channel_json(graph.smoothed_states, first)},
+               {"first_command_s", nullptr}};
+  if (command) json["first_command_s"] = seconds_between(first, *command);
+  return json;
+}
+
 Json live_json(const LiveAgreement& live, Utime first) {
   Json json = {{"recorded_scans", live.recorded},
                {"equal_scans", live.equal},
@@ -194,6 +210,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
   json["duration_s"] = seconds;
   json["input"] = inventory_json(input.inventory());
   json["live"] = live_json(source.live, input.inventory().first_utime);
+  json["live"]["graph"] = graph_json(source.graph, input.live_results().first_command, input.inventory().first_utime);
   json["imu_samples"] = result.imu_samples;
   json["imu_rejected"] = result.rejected_imu;
   json["scans"] = result.scans.size();
@@ -226,6 +243,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
                     {"scan_p50_ms_by_quarter", medians_by_quarter(result.scan_times_ms)},
                     {"frontend", timer_json(pipeline.frontend_timer())},
                     {"backend", timer_json(pipeline.backend_timer())},
+                    {"batch_optimum", timer_json(pipeline.batch_timer())},
                     {"map", timer_json(pipeline.map_timer())}};
   return json;
 }
@@ -269,6 +287,29 @@ std::string losses(const LogInventory& inventory) {
   return text;
 }
 
+std::string graph_agreement(const ReplaySource& source) {
+  const Utime first = source.input.inventory().first_utime;
+  const std::pair<const char*, const ChannelAgreement*> channels[] = {
+      {"keyframe messages", &source.graph.keyframes},
+      {"messages of corrected poses", &source.graph.revisions},
+      {"loop results", &source.graph.loops},
+      {"smoothed states", &source.graph.smoothed_states}};
+  std::string text;
+  for (const auto& [name, channel] : channels) {
+    if (channel->recorded == 0) continue;
+    text += std::format("            {} of {} {}", channel->equal, channel->recorded, name);
+    if (channel->first_unequal) {
+      text += std::format("; the first that differs is of {:.3f} s", seconds_between(first, *channel->first_unequal));
+    }
+    text += '\n';
+  }
+  if (const std::optional<Utime>& command = source.input.live_results().first_command) {
+    text += std::format("            at {:.3f} s somebody had a loop taken out of the live graph; a replay does not\n",
+                        seconds_between(first, *command));
+  }
+  return text;
+}
+
 /// Whether the replay gave what the live run had given.
 std::string agreement(const ReplaySource& source) {
   const LiveAgreement& live = source.live;
@@ -282,7 +323,7 @@ std::string agreement(const ReplaySource& source) {
       text += std::format("; the recording began when the live run had {} scans behind it", live.first_sequence);
     }
   }
-  return text + '\n';
+  return text + '\n' + graph_agreement(source);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "graph_agreement.h"
 #include "live_agreement.h"
 #include "replay_input.h"
 #include "replay_pipeline.h"
@@ -19,7 +20,8 @@ struct ReplayTiming {
 struct ReplaySource {
   std::filesystem::path log;
   const ReplayInput& input;
-  LiveAgreement live;  ///< with the live run in the same log
+  LiveAgreement live;    ///< with the live run in the same log
+  GraphAgreement graph;  ///< the same of its back end
 };
 
 /// Writes eskf.tum, smoothed.tum, ground_truth.tum (where the log has it), keyframes.g2o, map.pcd, map.ply,

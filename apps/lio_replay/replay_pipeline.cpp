@@ -11,12 +11,13 @@ BackendConfig with_loops(BackendConfig config, bool use_loops) {
 
 }  // namespace
 
-ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops)
+ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener)
     : backend_config_(with_loops(config.backend, use_loops)),
       loop_gates_(config.frontend.loop_gates),
       lio_(config.frontend.filter),
       smoother_(backend_config_, loop_gates_),
-      map_(config.map) {
+      map_(config.map),
+      listener_(listener) {
   map_.draw_at_rebuild();  // finish() does; nobody looks before
 }
 
@@ -49,6 +50,8 @@ void ReplayPipeline::follow_session(std::int32_t session) {
   ++result_.sessions;
   settle_graph();
   smoother_ = Smoother(backend_config_, loop_gates_);
+  schedule_ = {};
+  newest_keyframe_ = 0;
   map_.clear();
   keyframes_.clear();
   result_.loops.clear();
@@ -56,15 +59,36 @@ void ReplayPipeline::follow_session(std::int32_t session) {
 
 void ReplayPipeline::take_keyframe(const Keyframe& sent) {
   for (const keyframe_t& part : messages::to_messages(sent)) {
+    if (listener_ != nullptr) listener_->keyframe_sent(part);
     const std::optional<Keyframe> keyframe = assembler_.add(part);
     if (!keyframe) continue;
     map_.add_keyframe(*keyframe);
+    adopt_due_optimum();
     const SmootherUpdate update = backend_timer_.time([&] { return smoother_.add_keyframe(*keyframe); });
+    newest_keyframe_ = keyframe->state.utime;
     keyframes_[keyframe->id] = {keyframe->state.utime, keyframe->state.T_odom_body, keyframe->state.T_odom_body};
     if (update.loop) result_.loops.push_back(*update.loop);
     result_.loops.insert(result_.loops.end(), update.changed.begin(), update.changed.end());
-    if (update.accepted()) correct_map(update);
+    if (update.accepted()) publish(update);
   }
+}
+
+void ReplayPipeline::adopt_due_optimum() {
+  if (!schedule_.adoption_due(smoother_.stats().keyframes)) return;
+  schedule_.end();
+  const int swaps = smoother_.stats().shadow_swaps;
+  const SmootherUpdate update = smoother_.adopt(batch_timer_.time([&] { return solve(problem_); }));
+  if (smoother_.stats().shadow_swaps != swaps) publish(update);
+}
+
+/// What the back end does with an update that it accepted.
+void ReplayPipeline::publish(const SmootherUpdate& update) {
+  if (listener_ != nullptr) listener_->graph_changed(smoother_, update, session_, newest_keyframe_);
+  correct_map(update);
+  schedule_.note(update);
+  if (!schedule_.begin_due()) return;
+  schedule_.begin(smoother_.stats().keyframes);
+  problem_ = smoother_.shadow_problem();
 }
 
 void ReplayPipeline::correct_map(const SmootherUpdate& update) {
@@ -88,7 +112,7 @@ void ReplayPipeline::rebuild_map() {
 
 /// Places the poses of this session where its graph has them in the end.
 void ReplayPipeline::settle_graph() {
-  result_.optimum = solve(smoother_.shadow_problem());
+  result_.optimum = batch_timer_.time([&] { return solve(smoother_.shadow_problem()); });
   correct_map(smoother_.adopt(result_.optimum));
   std::vector<KeyframeCorrection> corrections;
   for (const KeyframePose& pose : smoother_.all_poses()) {

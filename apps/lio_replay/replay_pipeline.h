@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "backend/corrected_trajectory.h"
+#include "backend/shadow_schedule.h"
 #include "backend/smoother.h"
 #include "frontend/lio.h"
+#include "graph_listener.h"
 #include "map/live_map.h"
 #include "messages/keyframe_messages.h"
 #include "runtime/ignis_config.h"
@@ -40,11 +42,13 @@ struct ReplayResult {
 };
 
 /// All cores in one process. Keyframes pass through their message form, so that they carry the same rounding as on the
-/// bus and a replay equals the live run. When the front end begins a new session, so do graph and map, as in the
-/// processes: their numbers and files are of the newest session, the trajectories of all.
+/// bus and a replay equals the live run; the batch optimum is taken over where the back end does (ShadowSchedule), and
+/// once more at the end. When the front end begins a new session, so do graph and map, as in the processes: their
+/// numbers and files are of the newest session, the trajectories of all.
 class ReplayPipeline {
  public:
-  ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops);
+  /// `listener` may be null; it outlives the pipeline.
+  ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener = nullptr);
 
   void add_imu(const ImuSample& sample);
   void add_scan(const Scan& scan);
@@ -57,12 +61,15 @@ class ReplayPipeline {
 
   [[nodiscard]] const StageTimer& frontend_timer() const { return frontend_timer_; }
   [[nodiscard]] const StageTimer& backend_timer() const { return backend_timer_; }
+  [[nodiscard]] const StageTimer& batch_timer() const { return batch_timer_; }
   [[nodiscard]] const StageTimer& map_timer() const { return map_timer_; }
 
  private:
   void take(const ScanResult& scan, double milliseconds);
   void follow_session(std::int32_t session);
   void take_keyframe(const Keyframe& keyframe);
+  void adopt_due_optimum();
+  void publish(const SmootherUpdate& update);
   void settle_graph();
   void correct_map(const SmootherUpdate& update);
   void rebuild_map();
@@ -71,13 +78,18 @@ class ReplayPipeline {
   LoopGates loop_gates_;
   Lio lio_;
   Smoother smoother_;
+  ShadowSchedule schedule_;
+  ShadowProblem problem_;  // copied when the schedule began; solved when it is due
+  Utime newest_keyframe_ = 0;
   LiveMap map_;
   messages::KeyframeAssembler assembler_;
   std::map<std::int32_t, KeyframeCorrection> keyframes_;
   std::int32_t session_ = 0;
+  GraphListener* listener_;
   ReplayResult result_;
   StageTimer frontend_timer_;
   StageTimer backend_timer_;
+  StageTimer batch_timer_;  // of the batch optimum, which the live back end computes on a second thread
   StageTimer map_timer_;
 };
 

@@ -25,6 +25,7 @@ from ignis import results
 from ignis.compare import comparison, table
 from ignis.errors import EXIT_FAILURE, InputError, run_command
 from ignis.files import write_text
+from ignis.log_config import CONFIG_CHANNEL, encoded
 from ignis.pipeline import Pipeline, ProcessDied, binary, effective_config, enter_private_network
 from ignis.progress import Progress
 
@@ -72,7 +73,7 @@ def _demo(options: argparse.Namespace) -> int:
     print(f"Scene {options.scene.stem}, {duration:.0f} s in real time. Watch it at {address}", flush=True)
     with Pipeline(options.out, config["lcm"]["url"]) as pipeline:
         try:
-            _drive(pipeline, options, listener, duration)
+            _drive(pipeline, options, config, listener, duration)
         except ProcessDied as error:
             print(f"ignis: {error}", file=sys.stderr)
             print(f"ignis: what each process said is in {pipeline.logs}", file=sys.stderr)
@@ -121,7 +122,9 @@ def _listen(wanted: int | None, default: int) -> socket.socket:
     raise InputError(f"port {wanted} is occupied; give another one with --port, or leave it out")
 
 
-def _drive(pipeline: Pipeline, options: argparse.Namespace, listener: socket.socket, duration: float) -> None:
+def _drive(
+    pipeline: Pipeline, options: argparse.Namespace, effective: dict[str, Any], listener: socket.socket, duration: float
+) -> None:
     """Starts everything, waits for the end of the drive, and lets the last messages arrive."""
     config = ("--config", options.config)
     port = options.out / "l1.pty"
@@ -133,9 +136,10 @@ def _drive(pipeline: Pipeline, options: argparse.Namespace, listener: socket.soc
         "l1_sim", "--scene", options.scene, *config, "--seed", options.seed, "--pty", port, "--wait", 20
     )
     pipeline.wait_for_text("l1_sim", "waiting", 10.0)
+    news = _News(pipeline.environment["LCM_DEFAULT_URL"])
+    news.bus.publish(CONFIG_CHANNEL, encoded(effective))  # into the log, so that it can be replayed by itself
     pipeline.start("l1_driver", *config, "--port", port)
 
-    news = _News(pipeline.environment["LCM_DEFAULT_URL"])
     progress = Progress("driving")
     began = time.monotonic()
     while simulator.poll() is None:
@@ -147,6 +151,7 @@ def _drive(pipeline: Pipeline, options: argparse.Namespace, listener: socket.soc
     if simulator.returncode != 0:
         raise ProcessDied(f"l1_sim ended with code {simulator.returncode}: {pipeline.last_words('l1_sim')}")
     time.sleep(SETTLE_SECONDS)
+    news.bus.publish(CONFIG_CHANNEL, encoded(effective))  # again: datagrams may be lost
     pipeline.check("l1_sim", "l1_driver")
 
 

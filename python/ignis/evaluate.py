@@ -17,6 +17,7 @@ from ignis.errors import InputError, run_command, run_quietly
 from ignis.evaluation.consistency import BAND, band, nees_of
 from ignis.evaluation.drives import Simulation, simulated
 from ignis.files import write_text
+from ignis.mounts import refuse_mounts
 from ignis.poses import read_tum
 from ignis.trajectory_error import errors_of, paired
 
@@ -124,6 +125,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
         raise InputError(f"no such scene: {', '.join(missing)}")
     binaries = Path(os.environ["IGNIS_BUILD"]) / "bin"
     variants = arguments.variant or [Variant("as configured")]
+    refuse_mounts([change for variant in variants for change in variant.changes])
     drives = [(scene, seed) for seed in arguments.seeds for scene in arguments.scenes]
     rows: list[Row] = []
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:

@@ -24,6 +24,7 @@ class ImportChoice:
     imu: str | None = None  # topic of the inertial data
     metadata: Path | None = None  # of an Ouster sensor
     no_deskew: bool = False  # clouds may lack per-point times
+    changes: tuple[str, ...] = ()  # of the configuration, section.key=value
 
 
 def add_choices(parser: argparse.ArgumentParser) -> None:
@@ -32,11 +33,14 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--imu", metavar="TOPIC", help="topic of the inertial data, if the bag has several")
     parser.add_argument("--metadata", type=Path, metavar="JSON", help="metadata of an Ouster packet capture")
     parser.add_argument("--no-deskew", action="store_true", help="take clouds without per-point times as they are")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="wins over the configuration; repeatable"
+    )
 
 
 def choice_of(parsed: argparse.Namespace) -> ImportChoice:
     """The choices out of parsed arguments."""
-    return ImportChoice(parsed.cloud, parsed.imu, parsed.metadata, parsed.no_deskew)
+    return ImportChoice(parsed.cloud, parsed.imu, parsed.metadata, parsed.no_deskew, tuple(parsed.set))
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -51,7 +55,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 def detect(path: Path) -> str:
     """The kind of a recording: kitti, bag, ouster, capture or lcm. Refuses everything else."""
     if not path.exists():
-        raise InputError(f"{path} does not exist; give {_KINDS}")
+        raise InputError(f"{path} does not exist")
     if path.is_dir():
         if rosbag.is_bag(path):
             return "bag"
@@ -80,10 +84,10 @@ def import_recording(source: Path, output: Path, config: Path, choice: ImportCho
         raise InputError(f"{source} is already an LCM log; give it to ./ignis replay")
     if kind != "bag" and (choice.cloud or choice.imu):
         raise InputError("--cloud and --imu choose topics of a bag; this input has none")
-    extrinsics = read_extrinsics(config)
+    extrinsics = read_extrinsics(config, choice.changes)
     with replacing(output) as temporary:
         if kind == "capture":
-            remarks = l1_capture.import_capture(source, config, temporary)
+            remarks = l1_capture.import_capture(source, config, temporary, choice.changes)
         else:
             with Recorder(temporary, extrinsics) as recorder:
                 if (drive := kitti_raw.find_drive(source) if kind == "kitti" else None) is not None:

@@ -7,6 +7,7 @@ Body and world axes: +X right, +Y up, -Z forward.
 import json
 import os
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -83,21 +84,29 @@ class Extrinsics:
     imu: Mount = field(default_factory=Mount)
 
 
-def effective_config(path: Path) -> dict[str, Any]:
-    """The configuration with all defaults, validated by the front end itself where it has been built."""
+def effective_config(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
+    """The configuration with all defaults and `changes` (section.key=value), validated by the front end itself.
+
+    Where the front end has not been built, the file is taken as it is; changes then raise InputError.
+    """
     if not path.is_file():
         raise InputError(f"cannot read the configuration {path}: no such file")
     front_end = Path(os.environ.get("IGNIS_BUILD", ".")) / "bin" / "lio_frontend"
     text = path.read_text(encoding="utf-8", errors="replace")
     if front_end.is_file():
         printed = subprocess.run(
-            [str(front_end), "--config", str(path), "--print-config"], capture_output=True, text=True, check=False
+            [str(front_end), "--config", str(path), *set_options(changes), "--print-config"],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if printed.returncode != 0:
             raise InputError(
                 printed.stderr.strip().removeprefix("lio_frontend: ") or f"{path} was refused by {front_end}"
             )
         text = printed.stdout
+    elif changes:
+        raise InputError(f"{front_end} does not exist, and --set needs it; run ./ignis build first")
     try:
         config = json.loads(text)
     except json.JSONDecodeError as error:
@@ -107,9 +116,25 @@ def effective_config(path: Path) -> dict[str, Any]:
     return config
 
 
-def read_extrinsics(path: Path) -> Extrinsics:
-    """The mounts that a configuration file describes."""
-    section = effective_config(path).get("extrinsics", {})
+def set_options(changes: Sequence[str]) -> list[str]:
+    """Changes as options for the executables."""
+    return [word for change in changes for word in ("--set", change)]
+
+
+def mounts_among(changes: Sequence[str]) -> list[str]:
+    """The changes that move a sensor: they count when a recording is imported, never for a log in the body frame."""
+    return [change for change in changes if change.partition("=")[0].strip().startswith("extrinsics.")]
+
+
+def refuse_mounts(changes: Sequence[str]) -> None:
+    """Raises InputError when logs that are in the body frame already should be computed with other mounts."""
+    if moved := mounts_among(changes):
+        raise InputError(f"{', '.join(moved)}: logs are in the body frame already; mounts count at import alone")
+
+
+def read_extrinsics(path: Path, changes: Sequence[str] = ()) -> Extrinsics:
+    """The mounts that a configuration file with changes (section.key=value) describes."""
+    section = effective_config(path, changes).get("extrinsics", {})
     if not isinstance(section, dict) or not all(isinstance(section.get(name, {}), dict) for name in ("lidar", "imu")):
         raise InputError(f"{path}: extrinsics must be an object with the objects lidar and imu")
     return Extrinsics(

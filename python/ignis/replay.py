@@ -2,7 +2,7 @@
 """`./ignis replay`: the whole pipeline over a recording of any kind, and a page about it.
 
 An LCM log is replayed as it is; a capture, bag, packet capture or KITTI drive is imported first. `lio_replay` does the
-work; options that are not listed here (--set, --no-loops, --speed, --until, ...) go to it.
+work; options that are not listed here (--no-loops, --speed, --until, ...) go to it.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from ignis.errors import EXIT_FAILURE, EXIT_INTERRUPTED, InputError, run_command
 from ignis.files import write_text
 from ignis.importing import ImportChoice, add_choices, choice_of, detect, import_recording
 from ignis.log_config import differences, recorded_config
+from ignis.mounts import mounts_among, set_options
 from ignis.pages.run_page import write_run_page
 from ignis.run_folder import read_run
 
@@ -47,7 +48,10 @@ def replay(
             raise InputError(f"{source} must be imported first: give --config with the mounts of its sensors")
         log = folder / _IMPORTED_NAME
         import_recording(source, log, config, choice)
-    command = [str(lio_replay()), str(log), "--out", str(folder), *options]
+    elsewhere = mounts_among(choice.changes) if kind == "lcm" else []
+    if elsewhere:
+        print(f"WARNING: {source} is in the body frame already; no effect has {', '.join(elsewhere)}", file=sys.stderr)
+    command = [str(lio_replay()), str(log), "--out", str(folder), *set_options(choice.changes), *options]
     if config is not None:
         command += ["--config", str(config)]
     code = _run_to_the_end(command)

@@ -77,8 +77,9 @@ KeyframeVerdict verdict_on(const Keyframe& keyframe, const SmootherState& state,
     return KeyframeVerdict::kGap;
   }
   reason = keyframe_problem(keyframe);
-  if (reason.empty() && !state.nodes.empty() && keyframe.state.utime <= state.nodes.back().end.utime) {
-    reason = "the stamp does not come after the previous keyframe's";
+  if (reason.empty() && !state.nodes.empty()) {
+    const LinkEnd& newest = state.nodes.back().end;
+    reason = succession_problem(keyframe, newest.utime, newest.T_odom_body);
   }
   return reason.empty() ? KeyframeVerdict::kAccepted : KeyframeVerdict::kInvalid;
 }

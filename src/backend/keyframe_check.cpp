@@ -10,6 +10,7 @@ constexpr double kUnitTolerance = 1e-3;
 constexpr double kSymmetryTolerance = 1e-6;  // relative to the largest entry
 constexpr double kAbsurdPosition = 1e6;      // [m]
 constexpr double kAbsurdSpeed = 500.0;       // [m/s]
+constexpr double kLeapFreedom = 10.0;        // [m] whatever the interval: a correction of the front end
 constexpr double kAbsurdBias = 100.0;        // [rad/s] or [m/s^2]
 
 }  // namespace
@@ -28,6 +29,13 @@ std::string keyframe_problem(const Keyframe& keyframe) {
   const double skewness = (information - information.transpose()).cwiseAbs().maxCoeff();
   if (skewness > kSymmetryTolerance * information.cwiseAbs().maxCoeff()) return "the scan information is not symmetric";
   return {};
+}
+
+std::string succession_problem(const Keyframe& keyframe, Utime utime, const Pose& T_odom_body) {
+  if (keyframe.state.utime <= utime) return "the stamp does not come after the previous keyframe's";
+  const double distance = (keyframe.state.T_odom_body.translation - T_odom_body.translation).norm();
+  const double reach = kAbsurdSpeed * seconds_between(utime, keyframe.state.utime) + kLeapFreedom;
+  return distance > reach ? "the leap from the previous keyframe is absurd" : "";
 }
 
 }  // namespace ignis

@@ -7,12 +7,14 @@
 
 #include "backend/keyframe_pose.h"
 #include "backend/loop_result.h"
+#include "backend/smoother.h"
 #include "common/time.h"
 #include "ignis/loop_result_t.hpp"
 #include "ignis/smoothed_keyframes_t.hpp"
+#include "ignis/state_t.hpp"
 #include "messages/part_assembler.h"
 
-/// SMOOTHED_KEYFRAMES and LOOP_RESULT. The sender sets `sequence`.
+/// SMOOTHED_KEYFRAMES, LOOP_RESULT and SMOOTHED_STATE. The sender sets `sequence`.
 namespace ignis::messages {
 
 /// One published state of the graph.
@@ -28,6 +30,13 @@ struct GraphRevision {
   std::vector<KeyframePose> poses;
 };
 
+/// What an update changed. `smoother` is the one that made it, `utime` [us] the stamp of its newest keyframe.
+[[nodiscard]] GraphRevision revision_of(const Smoother& smoother, const SmootherUpdate& update, std::int32_t session,
+                                        Utime utime);
+
+/// Makes it a full one: lists every keyframe of the graph.
+void list_all(GraphRevision& revision, const Smoother& smoother);
+
 /// A revision as numbered parts of one datagram each; the sender sets one `sequence` for all of them.
 [[nodiscard]] std::vector<smoothed_keyframes_t> to_messages(const GraphRevision& revision);
 
@@ -41,6 +50,9 @@ class RevisionAssembler {
  private:
   PartAssembler<smoothed_keyframes_t> parts_;
 };
+
+/// A state of the filter, placed in map by the newest correction.
+[[nodiscard]] state_t smoothed_state(NavState state, std::int32_t session, const Pose& T_map_odom);
 
 [[nodiscard]] loop_result_t to_message(const LoopResult& result, std::int32_t session);
 

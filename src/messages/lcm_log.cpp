@@ -4,6 +4,8 @@
 #include <format>
 #include <stdexcept>
 
+#include <sys/mman.h>
+
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
 
@@ -110,6 +112,11 @@ std::optional<LogEvent> LcmLog::next() {
     ++damaged_bytes_;
   }
   return std::nullopt;
+}
+
+void LcmLog::release_memory() const {
+  // Boost's advise() ends in posix_madvise(), which glibc ignores. A read-only mapping has nothing to lose.
+  ::madvise(mapping_->region.get_address(), mapping_->region.get_size(), MADV_DONTNEED);
 }
 
 std::int64_t LcmLog::size_bytes() const { return std::ssize(mapping_->bytes()); }

@@ -33,6 +33,9 @@ class LcmLog {
   /// The next whole record, or nothing at the end.
   [[nodiscard]] std::optional<LogEvent> next();
 
+  /// Gives back the memory of what has been read; what is read again comes from the disk again. Views stay valid.
+  void release_memory() const;
+
   [[nodiscard]] std::int64_t size_bytes() const;
   [[nodiscard]] std::int64_t position() const;
 

@@ -19,10 +19,13 @@
 #include "ignis/scan_t.hpp"
 #include "ignis/smoothed_keyframes_t.hpp"
 #include "ignis/state_t.hpp"
+#include "messages/type_name.h"
 
 /// Generated LCM decoders read out of bounds when an array count wraps, and throw on bad string lengths. So the length
 /// of a message is checked against its own counts before any decoder sees it.
 namespace ignis::messages {
+
+inline constexpr std::size_t kFingerprintBytes = 8;
 
 /// One stretch of an encoded message body (behind the 8-byte fingerprint).
 struct LayoutStep {
@@ -113,13 +116,18 @@ template <class Message>
   return possible(message.utime);
 }
 
+/// Whether the data is of the type and version and as long as its counts say: what is left to check are the stamps.
+template <class Message>
+[[nodiscard]] bool is_whole(std::span<const std::byte> data) {
+  return data.size() >= kFingerprintBytes && fingerprint_of(data) == static_cast<std::uint64_t>(Message::getHash()) &&
+         length_is_consistent(kLayout<Message>, data.subspan(kFingerprintBytes));
+}
+
 /// Decodes a whole message. False: another type, another version, a body whose length contradicts its counts, or a
 /// stamp that no clock shows.
 template <class Message>
 [[nodiscard]] bool decode_checked(std::span<const std::byte> data, Message& message) {
-  constexpr std::size_t kFingerprintBytes = 8;
-  if (data.size() < kFingerprintBytes) return false;
-  if (!length_is_consistent(kLayout<Message>, data.subspan(kFingerprintBytes))) return false;
+  if (!is_whole<Message>(data)) return false;
   const int size = static_cast<int>(data.size());
   return message.decode(data.data(), 0, size) == size && stamps_are_possible(message);
 }

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 
+#include <boost/endian/conversion.hpp>
+
 #include "messages/field_copy.h"
+#include "messages/length_check.h"
 
 namespace ignis::messages {
 
@@ -52,6 +55,18 @@ std::vector<scan_t> to_messages(const Scan& scan) {
     }
   }
   return parts;
+}
+
+std::optional<ScanHead> read_scan_head(std::span<const std::byte> data) {
+  if (!is_whole<scan_t>(data)) return std::nullopt;
+  // Order of the fields in scan_t.lcm.
+  const auto* body = reinterpret_cast<const unsigned char*>(data.data()) + kFingerprintBytes;
+  const ScanHead head{.utime = boost::endian::load_big_s64(body),
+                      .sequence = boost::endian::load_big_s32(body + 8),
+                      .part = boost::endian::load_big_s16(body + 12),
+                      .part_count = boost::endian::load_big_s16(body + 14)};
+  if (!stamps_are_possible(head)) return std::nullopt;
+  return head;
 }
 
 std::optional<Scan> ScanAssembler::add(const scan_t& part) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/measurements.h"
@@ -19,6 +21,17 @@ inline constexpr float kUnknownTemperature = -1000.0F;
 
 /// A scan as one message, or as numbered parts when it does not fit one datagram.
 [[nodiscard]] std::vector<scan_t> to_messages(const Scan& scan);
+
+/// What stands at the front of an encoded L1_SCAN.
+struct ScanHead {
+  Utime utime = 0;  ///< [us] of the first point
+  std::int32_t sequence = 0;
+  std::int16_t part = 0;
+  std::int16_t part_count = 0;
+};
+
+/// Reads the head without the points; nothing where decode_checked() would refuse the message.
+[[nodiscard]] std::optional<ScanHead> read_scan_head(std::span<const std::byte> data);
 
 /// Puts the parts of scans together again.
 class ScanAssembler {

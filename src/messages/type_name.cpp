@@ -8,8 +8,6 @@
 namespace ignis::messages {
 namespace {
 
-constexpr std::size_t kFingerprintBytes = 8;
-
 template <class... Types>
 std::string name_among(std::uint64_t fingerprint) {
   std::string name;

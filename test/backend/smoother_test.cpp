@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <map>
+#include <random>
 
 #include "backend/synthetic_drive.h"
 #include "backend/text_contains.h"
@@ -140,6 +141,7 @@ TEST(Smoother, RefusesWhatIsNotFiniteAndStaysAsItWas) {
       {"information", [](Keyframe& k, double v) { k.scan_information(2, 4) = v; }},
       {"symmetric", [](Keyframe& k, double) { k.scan_information(2, 4) = 1e3; }},
       {"unit length", [](Keyframe& k, double) { k.state.T_odom_body.rotation.coeffs() *= 1.1; }},
+      {"leap", [](Keyframe& k, double) { k.state.T_odom_body.translation.x() += 2000.0; }},
       {"stamp", [](Keyframe& k, double) { k.state.utime = k.previous_utime; }}};
   for (const auto& [word, spoil] : spoilers) {
     Smoother smoother = filled(drive.keyframes, 5);
@@ -156,6 +158,50 @@ TEST(Smoother, RefusesWhatIsNotFiniteAndStaysAsItWas) {
     EXPECT_TRUE(next.accepted()) << next.reason;
     EXPECT_TRUE(smoother.all_poses().back().T_map_body.all_finite());
   }
+}
+
+/// Sane one by one, but no digits are left for the attitudes: leaps of hundreds of metres that odometry claims to know
+/// to a micrometre, without IMU.
+std::vector<Keyframe> numerically_hopeless(std::vector<Keyframe> keyframes, unsigned seed) {
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto number = [&] { return uniform(generator); };
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  for (Keyframe& keyframe : keyframes) {
+    position += 740.0 * Eigen::Vector3d(number(), number(), number()).normalized();
+    keyframe.state.T_odom_body.translation = position;
+    keyframe.scan_information *= 1e12;
+    keyframe.imu_complete = false;
+  }
+  return keyframes;
+}
+
+TEST(Smoother, DropsAKeyframeThatTheSolverRefusesAndStaysAsItWas) {
+  BackendConfig config = without_loops();
+  config.odometry_floor_m = 1e-6;
+  config.odometry_floor_rad = 1e-7;
+  config.scan_information_scale = 1.0;
+  const testing::Drive drive = testing::make_drive({.keyframes = 25});
+  int refusals = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Smoother smoother(config, LoopGates());
+    for (const Keyframe& keyframe : numerically_hopeless(drive.keyframes, seed)) {
+      const std::size_t size = smoother.all_poses().size();
+      const std::int32_t revision = smoother.revision();
+      const SmootherUpdate update = smoother.add_keyframe(keyframe);
+      EXPECT_EQ(update.expected_id, keyframe.id + 1);
+      if (!update.accepted()) {
+        ++refusals;
+        EXPECT_EQ(update.verdict, KeyframeVerdict::kSolver);
+        EXPECT_FALSE(update.reason.empty());
+        EXPECT_EQ(smoother.all_poses().size(), size);
+        EXPECT_EQ(smoother.revision(), revision);
+      }
+      for (const Pose& pose : poses_of(smoother)) ASSERT_TRUE(pose.all_finite());
+    }
+    EXPECT_EQ(smoother.stats().invalid + smoother.stats().keyframes, 25);
+  }
+  EXPECT_GT(refusals, 0);
 }
 
 TEST(Smoother, DoesWithoutImuThatIsIncompleteOrBroken) {

@@ -19,6 +19,7 @@ PROCESSES = ("lio_frontend", "graph_backend", "map_builder", "l1_driver")
 SEED = 77
 STOPS = 6
 STOP_WITHIN_S = 2.0
+LEAST_VOXEL_SHARE = 0.5  # scans between the keyframes before the kill are gone
 
 
 def arguments(process: str, folder: Path) -> list[object]:
@@ -181,3 +182,27 @@ def test_fault_p6_a_killed_logger_costs_the_log_at_most_a_tenth_of_a_second(
     assert events and read_log(log) is not None
     kept = int.from_bytes(events[-1].data, "big")
     assert sent[-1] - sent[kept - 1] < 0.1 + 0.1, "0.1 s is promised; the machine may be busy"
+
+
+def test_fault_p4_a_killed_map_has_every_keyframe_again_and_most_of_its_voxels(
+    drive_log: Path, undisturbed: Seen, tmp_path: Path
+) -> None:
+    killed_at = random.Random(SEED).uniform(4.0, 6.0)
+    with FaultRun(tmp_path) as run:
+        state = {"killed": False}
+
+        def meanwhile(seconds: float) -> None:
+            if seconds > killed_at and not state["killed"]:
+                state["killed"] = True
+                run.pipeline.processes["map_builder"].kill()
+                run.pipeline.processes["map_builder"].wait()
+                run.pipeline.start("map_builder", "--config", CONFIG, "--port", PORT)
+
+        run.play(drive_log, meanwhile)
+        deadline, wanted = time.monotonic() + 10.0, len(run.seen.poses)
+        while (status := run.view_status())["keyframes"] < wanted and time.monotonic() < deadline:
+            run.listen(0.2)
+    shares = [mine / all_ for mine, all_ in zip(status["voxels"], undisturbed.status["voxels"], strict=True)]
+    print("seed", SEED, "killed after", killed_at, "s; share of the voxels per level", shares)
+    assert state["killed"] and len(undisturbed.poses) - 1 <= wanted <= status["keyframes"]
+    assert min(shares) > LEAST_VOXEL_SHARE

@@ -5,6 +5,8 @@
 #include <random>
 #include <vector>
 
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
@@ -53,6 +55,37 @@ class LcmLogTest : public testing::Test {
   std::filesystem::path folder_ = test::fresh_folder();
   std::filesystem::path file_;
 };
+
+/// [bytes] of files that this process has in memory.
+std::int64_t resident_file_bytes() {
+  std::int64_t size = 0;
+  std::int64_t resident = 0;
+  std::int64_t shared = 0;
+  std::ifstream("/proc/self/statm") >> size >> resident >> shared;
+  return shared * sysconf(_SC_PAGESIZE);
+}
+
+TEST_F(LcmLogTest, GivesMemoryBackAndReadsOn) {
+  constexpr std::int64_t kBytes = std::int64_t{48} << 20;
+  {
+    lcm::LogFile writer(file_.string(), "w");
+    std::vector<unsigned char> data(1 << 20, 7);
+    lcm::LogEvent event{.eventnum = 0, .timestamp = 0, .channel = "A", .datalen = 1 << 20, .data = data.data()};
+    for (int i = 0; i < 48; ++i) ASSERT_EQ(writer.writeEvent(&event), 0);
+  }
+  LcmLog log(file_);
+  std::int64_t sum = 0;
+  std::optional<LogEvent> last;
+  while (const std::optional<LogEvent> event = log.next()) {
+    for (const std::byte byte : event->data) sum += std::to_integer<int>(byte);
+    last = event;
+  }
+  EXPECT_EQ(sum, 7 * kBytes);
+  const std::int64_t before = resident_file_bytes();
+  log.release_memory();
+  EXPECT_LT(resident_file_bytes(), before - kBytes / 2);
+  EXPECT_EQ(std::to_integer<int>(last->data.back()), 7) << "views stay valid";
+}
 
 TEST_F(LcmLogTest, ReadsWhatLcmWrote) {
   LcmLog log(file_);

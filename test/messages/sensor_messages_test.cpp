@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "messages/sensor_messages.h"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
 namespace ignis::messages {
@@ -24,6 +26,34 @@ TEST(SensorMessages, ImuSurvivesTheRoundTrip) {
   EXPECT_EQ(back.gyro, sample.gyro);
   EXPECT_EQ(back.accel, sample.accel);
   EXPECT_TRUE(back.saturated);
+}
+
+std::vector<std::byte> encoded(const scan_t& message) {
+  std::vector<std::byte> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+TEST(SensorMessages, TheHeadOfAScanIsReadWithoutItsPoints) {
+  for (const scan_t& part : to_messages(scan_of(7'000))) {
+    const std::optional<ScanHead> head = read_scan_head(encoded(part));
+    ASSERT_TRUE(head);
+    EXPECT_EQ(head->utime, part.utime);
+    EXPECT_EQ(head->sequence, part.sequence);
+    EXPECT_EQ(head->part, part.part);
+    EXPECT_EQ(head->part_count, 3);
+  }
+}
+
+TEST(SensorMessages, AHeadIsRefusedWhereTheMessageIs) {
+  scan_t message = to_messages(scan_of(5)).front();
+  std::vector<std::byte> data = encoded(message);
+  EXPECT_FALSE(read_scan_head(std::span(data).first(data.size() - 1))) << "too short for its points";
+  EXPECT_FALSE(read_scan_head({}));
+  data[0] ^= std::byte{1};
+  EXPECT_FALSE(read_scan_head(data)) << "another type";
+  message.utime = std::numeric_limits<Utime>::max();
+  EXPECT_FALSE(read_scan_head(encoded(message))) << "no such time";
 }
 
 class ScanParts : public testing::TestWithParam<std::int32_t> {};

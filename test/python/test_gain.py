@@ -58,6 +58,9 @@ def test_one_drive_has_words_but_no_interval() -> None:
     assert result["gains"]["ate_rmse_m"]["interval"] is None
     assert "+50%" in result["words"][0] and "too few for a confidence interval" in result["words"][-1]
     assert gain_of(runs([0.2], [0.1999]))["words"][0].startswith("Smoothing made no difference")
+    sure = gain_of(runs([0.2, 0.21, 0.22, 0.23], [0.1998, 0.2097, 0.2198, 0.2297]))
+    assert sure["gains"]["ate_rmse_m"]["interval"][0] > 0.0
+    assert sure["words"][0].startswith("Smoothing made hardly a difference to ATE") and "(+0.1%;" in sure["words"][0]
 
 
 def test_missing_loops_and_missing_truth_are_told() -> None:

@@ -69,6 +69,18 @@ def test_records_are_put_in_the_order_in_which_they_were_complete(
     assert not list(tmp_path.glob("*.decoded")) and not list(tmp_path.glob("*.tmp"))
 
 
+def test_changes_of_the_configuration_reach_the_driver(
+    arguments: list[str], driver: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    driver.write_text('#!/bin/sh\necho "l1_driver: called with $*" >&2\nexit 2\n')
+    front_end = driver.with_name("lio_frontend")
+    front_end.write_text('#!/bin/sh\necho "{}"\n')
+    front_end.chmod(0o755)
+    assert main([*arguments, "--set", "extrinsics.lidar.yaw_deg=5", "--set", "extrinsics.imu.yaw_deg=6"]) == 2
+    said = capsys.readouterr().err
+    assert said.rstrip().endswith("--set extrinsics.lidar.yaw_deg=5 --set extrinsics.imu.yaw_deg=6")
+
+
 def test_a_capture_without_scans_is_refused(arguments: list[str], driver: Path, tmp_path: Path, capsys) -> None:
     with LogWriter(tmp_path / "driver.log") as writer:
         writer.write(78, "L1_IMU", imu_t().encode())

@@ -91,6 +91,34 @@ def test_bad_mounts_are_refused(tmp_path: Path, lidar: dict, said: str) -> None:
         read_extrinsics(path)
 
 
+@pytest.mark.parametrize("name", ["kitti", "ouster", "spinning"])
+def test_a_vehicle_without_an_l1_inherits_nothing_of_its_mount(name: str) -> None:
+    mounts = json.loads((ROOT / "config" / f"{name}.json").read_text())["extrinsics"]
+    for sensor in ("lidar", "imu"):
+        assert set(mounts[sensor]) == set(Mount.__dataclass_fields__), f"{name}: {sensor}"
+
+
+def test_the_spinning_vehicle_is_level_with_its_inertial_unit_at_the_origin() -> None:
+    mounts = read_extrinsics(ROOT / "config" / "spinning.json")
+    np.testing.assert_array_equal(mounts.imu.rotation(), R_OURS_FROM_FLU)
+    np.testing.assert_array_equal(mounts.imu.translation(), np.zeros(3))
+    np.testing.assert_array_equal(mounts.lidar.rotation(), R_OURS_FROM_FLU)
+
+
+def test_changes_reach_the_front_end_that_checks_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "bin" / "lio_frontend"
+    program.parent.mkdir()
+    config = tmp_path / "c.json"
+    config.write_text("{}")
+    program.write_text('#!/bin/sh\ntest "$3 $4" = "--set extrinsics.imu.yaw_deg=7" || exit 2\n'
+                       'echo \'{"extrinsics": {"lidar": {}, "imu": {"yaw_deg": 7}}}\'\n')  # fmt: skip
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    with pytest.raises(InputError, match=r"run \./ignis build first"):
+        read_extrinsics(config, ["extrinsics.imu.yaw_deg=7"])
+    monkeypatch.setenv("IGNIS_BUILD", str(tmp_path))
+    assert read_extrinsics(config, ["extrinsics.imu.yaw_deg=7"]).imu.yaw_deg == 7
+
+
 def test_the_front_end_validates_where_it_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = tmp_path / "bin" / "lio_frontend"
     program.parent.mkdir()

@@ -24,7 +24,7 @@ if "--print-config" in words:
 out = pathlib.Path(words[words.index("--out") + 1])
 (out.parents[1] / "calls.txt").open("a").write(out.name + "\\n")
 if "frontend.a=13" in changes and not (out.parents[1] / "mended").exists():
-    sys.exit("lio_replay: thirteen")
+    sys.exit("replay 10 %\\nlio_replay: thirteen: it holds:\\n  L1_IMU 3 messages")
 value = sum(float(change.split("=")[1]) for change in changes)
 row = "{:.6f} %s 0 0 0 0 0 1\\n"
 text = "".join(row.format(i) % (value + i) for i in range(5))
@@ -70,13 +70,16 @@ def test_every_log_meets_every_combination_in_the_order_of_the_grid(arguments: l
 def test_one_failure_is_a_row_and_is_tried_again(arguments: list[str], tmp_path: Path, capsys) -> None:
     grid = ["--set", "frontend.a=1,13,2"]
     assert main([*arguments, *grid]) == 1
-    assert "failed: one frontend.a=13: lio_replay ended with code 1: lio_replay: thirteen" in capsys.readouterr().err
+    assert "failed: one frontend.a=13: lio_replay ended with code 1: thirteen: it holds:" in capsys.readouterr().err
     table = pyarrow.parquet.read_table(tmp_path / "out" / "table.parquet").to_pydict()
     assert table["status"] == ["ok", "failed", "ok"] * 2
     assert table["trajectory_hash"] == ["1.0", None, "2.0"] * 2
+    page = (tmp_path / "out" / "sweep.html").read_text()
+    assert "two frontend.a=13: lio_replay ended with code 1: thirteen: it holds:" in page
     (tmp_path / "out" / "mended").touch()
     assert main([*arguments, *grid]) == 0
     assert calls(tmp_path) == 6 + 2
+    assert "<h2>Failed" not in (tmp_path / "out" / "sweep.html").read_text()
     assert "4 of 6 replays are there from before" in capsys.readouterr().out
 
 
@@ -129,12 +132,17 @@ def test_bad_options_are_one_sentence(more: list[str], said: str, arguments: lis
 
 
 def test_commas_inside_of_a_value_belong_to_it() -> None:
-    axes = parse_axes(["extrinsics.t=[0,1,2],[3,4,5]", 'frontend.start="a,b",rest'])
-    assert axes == {"extrinsics.t": ["[0,1,2]", "[3,4,5]"], "frontend.start": ['"a,b"', "rest"]}
+    axes = parse_axes(["map.t=[0,1,2],[3,4,5]", 'frontend.start="a,b",rest'])
+    assert axes == {"map.t": ["[0,1,2]", "[3,4,5]"], "frontend.start": ['"a,b"', "rest"]}
     assert combinations({}) == [()]
     assert len(combinations(axes)) == 4
     with pytest.raises(InputError):
         parse_axes(["frontend.a="])
+
+
+def test_mounts_are_refused_because_logs_are_in_the_body_frame_already() -> None:
+    with pytest.raises(InputError, match=r"extrinsics\.lidar\.yaw_deg=1,2: logs are in the body frame"):
+        parse_axes(["frontend.voxel_size_m=0.1", "extrinsics.lidar.yaw_deg=1,2"])
 
 
 def test_rows_survive_as_json(arguments: list[str], tmp_path: Path) -> None:

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "ignis/health_t.hpp"
 #include "ignis/imu_t.hpp"
 #include "ignis/pose_t.hpp"
 #include "ignis/scan_t.hpp"
@@ -93,15 +94,39 @@ TEST_F(ReplayInputTest, HandsOutInOrderOfStampsWhateverTheOrderOfRecords) {
 
 TEST_F(ReplayInputTest, NamesTheFirstOfAllGaps) {
   for (int i = 0; i < 50; ++i) {
-    if (i != 40 && i != 41) write_imu(i);  // 164,000 us is the first behind
+    if (i != 40 && i != 41) write_imu(i);  // 156,000 us is the last ahead
   }
-  for (const int i : {0, 1, 3, 4, 6}) write_scan(i);  // 150,000 us
+  for (const int i : {0, 1, 3, 4, 6}) write_scan(i);  // 50,000 us
   const ReplayInput input = opened();
   EXPECT_EQ(input.inventory().missing_imu, 2);
   EXPECT_EQ(input.inventory().missing_scans, 2);
   ASSERT_TRUE(input.inventory().first_drop);
-  EXPECT_EQ(input.inventory().first_drop->utime, 150'000);
+  EXPECT_EQ(input.inventory().first_drop->utime, 50'000) << "the missing scan's results are of an instant behind it";
   EXPECT_EQ(input.inventory().first_drop->what, "1 of L1_SCAN missing in the log");
+}
+
+TEST_F(ReplayInputTest, DatesAReportedLossBackToTheLastReportThatKnewOfNone) {
+  const auto write_health = [&](const char* process, Utime utime, std::int64_t lost) {
+    health_t health{};
+    health.utime = utime;
+    health.process = process;
+    health.num_receivers = 1;
+    health.channels = {"L1_IMU"};
+    health.received = {100};
+    health.lost = {lost};
+    health.rejected = {0};
+    health.queue_drops = {0};
+    write_message("HEALTH", health);
+  };
+  for (int i = 0; i < 50; ++i) write_imu(i);
+  write_scan(0);
+  write_health("lio_frontend", 20'000, 0);
+  write_health("map_builder", 30'000, 0);
+  write_health("lio_frontend", 120'000, 2);
+  write_health("lio_frontend", 160'000, 2);
+  const ReplayInput input = opened();
+  ASSERT_TRUE(input.inventory().first_drop);
+  EXPECT_EQ(input.inventory().first_drop->utime, 20'000);
 }
 
 TEST_F(ReplayInputTest, KnowsNoDropInAWholeLog) {

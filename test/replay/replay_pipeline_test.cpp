@@ -15,8 +15,9 @@ test::Drive hall_drive() {
   return test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 16.0, test::Sensors{}, 7);
 }
 
-ReplayResult replay(const test::Drive& drive) {
-  ReplayPipeline pipeline({}, true);
+ReplayResult replay(const test::Drive& drive, const runtime::IgnisConfig& config = {},
+                    GraphListener* listener = nullptr) {
+  ReplayPipeline pipeline(config, true, listener);
   auto imu = drive.imu.begin();
   for (const Scan& scan : drive.scans) {
     for (; imu != drive.imu.end() && imu->utime <= scan.end_utime(); ++imu) pipeline.add_imu(*imu);
@@ -46,6 +47,41 @@ TEST(ReplayPipeline, BeginsANewGraphWithTheFrontEndsNewSession) {
     EXPECT_EQ(result.smoothed[i].utime, result.odometry[i].utime);
     EXPECT_LT(body_difference(result.smoothed[i].T_world_body, result.odometry[i].T_world_body).tail<3>().norm(), 0.5);
   }
+}
+
+/// Counts what the back end would publish.
+class Publications : public GraphListener {
+ public:
+  void keyframe_sent(const keyframe_t& part) override { keyframes += part.part == 0 ? 1 : 0; }
+  void graph_changed(const Smoother& smoother, const SmootherUpdate& update, std::int32_t /*session*/,
+                     Utime /*utime*/) override {
+    ++changes;
+    loops += update.loop && update.loop->accepted() ? 1 : 0;
+    if (!update.loop) swapped_at.push_back(smoother.stats().keyframes);
+    EXPECT_EQ(update.revision, changes) << "every revision is told";
+  }
+
+  int keyframes = 0;
+  int changes = 0;
+  int loops = 0;
+  std::vector<int> swapped_at;  ///< keyframes in the graph when the batch optimum took its place
+};
+
+TEST(ReplayPipeline, TakesTheBatchOptimumOverWhereTheBackEndDoes) {
+  // Twice around, with any gap to the optimum worth a swap.
+  runtime::IgnisConfig config;
+  config.backend.shadow_swap_m = 1e-6;
+  config.backend.shadow_swap_rad = 1e-7;
+  config.frontend.loop_gates.loop_min_index_gap = 8;
+  const test::Drive drive =
+      test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 50.0, test::Sensors{}, 7);
+  Publications published;
+  const ReplayResult result = replay(drive, config, &published);
+  ASSERT_GE(published.loops, 1) << "the case is too easy";
+  ASSERT_GE(published.swapped_at.size(), 1U);
+  EXPECT_EQ(published.changes, published.keyframes + static_cast<int>(published.swapped_at.size()));
+  const auto first = std::ranges::find_if(result.loops, &LoopResult::accepted);
+  EXPECT_EQ(published.swapped_at.front(), first->keyframes + shadow_delay(first->keyframes));
 }
 
 TEST(ReplayPipeline, HasOneSessionWhereTheMapHolds) {

@@ -26,7 +26,7 @@ NOT_RUN = {
     r"ignis (up|down)\b": "vehicle_test runs it with a simulated sensor",
     r"ignis status +#": "a live table until Ctrl-C; --once is run",
     r"ignis spy": "a window; vehicle_spy_test opens it",
-    r"ignis (demo|build|test|lint|fuzz|evaluate)\b": "minutes; CI runs it",
+    r"ignis (demo|build|test|lint|fuzz|sanitize|evaluate)\b": "minutes; CI runs it",
     r"ignis format": "changes the checkout",
     r"ignis shell( +#|$)": "a shell for people",
     r"packaging/|vehicle_cost": "minutes, and needs root or the package",

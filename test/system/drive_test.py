@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from live_agreement import require_equal_up_to_the_first_drop
 
 from ignis import results
 from ignis.compare import comparison
+from ignis.log_config import recorded_config
 from ignis.pipeline import Pipeline, effective_config
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
@@ -107,17 +109,12 @@ def test_replay_of_the_recording_equals_the_live_run(drive: Drive, run_binary, t
     assert reports[0]["map_hash"] == reports[1]["map_hash"]
     for file in ("eskf.tum", "smoothed.tum", "keyframes.g2o", "map.pcd", "map.ply", "scan_stats.csv", "loops.csv"):
         assert (tmp_path / "first" / file).read_bytes() == (tmp_path / "second" / file).read_bytes(), file
-    live = (drive.folder / "eskf.tum").read_text().splitlines()
-    replayed = (tmp_path / "first" / "eskf.tum").read_text().splitlines()
-    assert len(live) == len(replayed)
-    for row, other in zip(live, replayed, strict=True):
-        for a, b in zip(row.split(), other.split(), strict=True):
-            assert abs(float(a) - float(b)) < 1e-6, (row, other)
+    assert reports[0]["live"]["recorded_scans"] > 500 and reports[0]["live"]["graph"]["loop_results"]["recorded"] > 10
+    require_equal_up_to_the_first_drop(reports[0])
 
 
 def test_interrupted_demo_ends_every_process_and_keeps_what_it_computed(tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    before = _running()
     demo = subprocess.Popen(
         [CHECKOUT / "ignis", "demo", "--quick", "--no-serve", "--out", folder],
         stdout=subprocess.PIPE,
@@ -136,11 +133,13 @@ def test_interrupted_demo_ends_every_process_and_keeps_what_it_computed(tmp_path
     output, _ = demo.communicate(timeout=60)
     assert "Interrupted" in output
     assert (folder / "run.lcmlog").stat().st_size > 100_000
+    assert recorded_config(folder / "run.lcmlog") == json.loads((folder / "config.json").read_text())
     assert (folder / "eskf.tum").exists()
-    assert not _running() - before
+    assert not _running(folder)
 
 
-def _running() -> set[str]:
-    """Process ids of everything that a demo starts."""
-    names = "l1_sim|l1_driver|lio_frontend|graph_backend|map_builder|lcm-logger"
-    return set(subprocess.run(["pgrep", "-f", f"bin/({names})"], capture_output=True, text=True).stdout.split())
+def _running(folder: Path) -> set[str]:
+    """Process ids of everything that a demo into this folder starts; others may have theirs on this computer."""
+    names = f"{os.environ['IGNIS_BUILD']}/bin/(l1_sim|l1_driver|lio_frontend|graph_backend|map_builder) "
+    found = subprocess.run(["pgrep", "-f", f"{names}|lcm-logger .*{folder}"], capture_output=True, text=True)
+    return set(found.stdout.split())

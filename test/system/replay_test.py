@@ -11,14 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+import numpy as np
 import pyarrow.parquet
 import pytest
 from mcap.reader import make_reader
 from nbclient import NotebookClient
 from playwright.sync_api import sync_playwright
 
+from ignis import read_log
 from ignis.log_config import CONFIG_CHANNEL, encoded
 from ignis.logs import LogWriter, read_events
+from ignis.mounts import read_extrinsics
 from ignis.pipeline import effective_config
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
@@ -75,6 +78,25 @@ def test_bad_options_end_before_anything_runs(option: str, said: str, logs: list
     assert not (tmp_path / "a" / "report.json").exists()
 
 
+def test_mounts_count_at_import_and_are_called_void_for_a_log(logs: list[Path], tmp_path: Path) -> None:
+    moved = ["--set", "extrinsics.lidar.yaw_deg=90"]
+    done = ignis("replay", logs[0], "--config", CONFIG, "--out", tmp_path / "a", "--no-page", "--until", "5", *moved)
+    assert done.returncode == 0, done.stderr
+    assert "in the body frame already; no effect has extrinsics.lidar.yaw_deg=90" in done.stderr
+    capture = CHECKOUT / "test" / "data" / "l1" / "golden_clean.bin"
+    points = []
+    for name, more in (("straight", []), ("turned", moved)):
+        done = ignis("importing", capture, "-o", tmp_path / name, "--config", CONFIG, *more)
+        assert done.returncode == 0, done.stderr
+        scan = read_log(tmp_path / name)["L1_SCAN"].ragged
+        points.append(np.column_stack([np.concatenate(scan[axis]) for axis in "xyz"]))
+    assert np.abs(points[1] - points[0]).max() > 1.0
+    # 90 degrees to the left about up, at the sensor: forward (-Z) becomes left (-X).
+    turn = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    origin = read_extrinsics(CONFIG).lidar.translation()
+    np.testing.assert_allclose(points[1] - origin, (points[0] - origin) @ turn.T, atol=1e-4)
+
+
 def test_a_shuffled_log_gives_the_same_bytes(logs: list[Path], tmp_path: Path) -> None:
     events = list(read_events(logs[0]))
     rng = random.Random(3)
@@ -111,8 +133,8 @@ def test_a_truncated_tail_and_a_gap_are_named_and_survived(logs: list[Path], tmp
     said = report(tmp_path / "a")["input"]
     assert said["missing_imu"] == 5 and said["damaged_bytes"] > 0
     assert said["first_drop"]["what"] == "5 of L1_IMU missing in the log"
-    assert said["first_drop"]["s"] == pytest.approx(1504 / 250, abs=0.02)
-    assert "first drop: at 6." in done.stdout
+    assert said["first_drop"]["s"] == pytest.approx(1498 / 250, abs=0.003)
+    assert "first drop: at 5.99" in done.stdout
 
 
 def test_a_foreign_log_is_listed_and_refused(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ METRICS = {
 LEVEL = 0.95
 _FEWEST = 3
 _RESAMPLES = 9999
-# A change of less than this share of the error is called none where a single drive has nothing to compare it with.
+# A change of less than this share of the error serves nobody, however sure it is.
 _NOTEWORTHY = 0.02
 
 
@@ -89,15 +89,17 @@ def _sentence(title: str, gain: dict[str, Any], unit: str) -> str:
         f"{title}: {gain['eskf_mean']:.3f} {unit} with ESKF only, {gain['smoothed_mean']:.3f} {unit} smoothed, "
         f"gain {gain['gain_mean']:+.4f} {unit}"
     )
+    share = gain["gain_mean"] / gain["eskf_mean"] if gain["eskf_mean"] > 0.0 else 0.0
     if gain["interval"] is None:
-        share = gain["gain_mean"] / gain["eskf_mean"] if gain["eskf_mean"] > 0.0 else 0.0
         if abs(share) < _NOTEWORTHY:
             return f"Smoothing made no difference to {change}."
         return f"Smoothing {'helped' if share > 0.0 else 'did not help, it cost accuracy'}. {change} ({share:+.0%})."
     low, high = gain["interval"]
     band = f"{LEVEL:.0%} interval {low:+.4f} to {high:+.4f} over {gain['drives']} drives"
-    if low > 0.0:
-        return f"Smoothing helped. {change} ({band}; better in {gain['better_in']})."
-    if high < 0.0:
-        return f"Smoothing did not help, it cost accuracy. {change} ({band})."
+    if low > 0.0 or high < 0.0:
+        if abs(share) < _NOTEWORTHY:
+            return f"Smoothing made hardly a difference to {change} ({share:+.1%}; {band})."
+        if low > 0.0:
+            return f"Smoothing helped. {change} ({share:+.0%}; {band}; better in {gain['better_in']})."
+        return f"Smoothing did not help, it cost accuracy. {change} ({share:+.0%}; {band})."
     return f"Smoothing did not clearly help. {change} ({band}, which contains 0)."

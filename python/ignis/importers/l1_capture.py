@@ -3,10 +3,12 @@
 
 import os
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 from ignis.errors import InputError
 from ignis.logs import LogDamage, LogWriter, read_log
+from ignis.mounts import set_options
 
 # Frames of the sensor: magic 0xFD, payload length, message id in bytes 7..9, 12 bytes around the payload.
 _MAGIC, _HEADER_BYTES, _FRAME_OVERHEAD = 0xFD, 10, 12
@@ -28,14 +30,14 @@ def _chain_length(head: bytes, at: int) -> int:
     return frames
 
 
-def import_capture(path: Path, config: Path, output: Path) -> list[str]:
+def import_capture(path: Path, config: Path, output: Path, changes: Sequence[str] = ()) -> list[str]:
     """Runs the driver over the capture and writes the log with records in order of their content."""
     driver = Path(os.environ.get("IGNIS_BUILD", ".")) / "bin" / "l1_driver"
     if not driver.is_file():
         raise InputError(f"{driver} does not exist; run ./ignis build first")
     decoded = output.with_name(output.name + ".decoded")
     environment = {**os.environ, "LCM_DEFAULT_URL": f"file://{decoded.resolve()}?mode=w"}
-    command = [str(driver), "--capture", str(path), "--config", str(config)]
+    command = [str(driver), "--capture", str(path), "--config", str(config), *set_options(changes)]
     try:
         run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if run.returncode != 0 or not decoded.is_file() or decoded.stat().st_size == 0:

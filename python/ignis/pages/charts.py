@@ -51,6 +51,13 @@ def _prepared(axes: Axes, x: str, y: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
+def _line(label: str) -> dict[str, Any]:
+    """The wider one lies below: where two estimates agree, both are seen."""
+    if label == TRUTH:
+        return {"lw": 5.0, "alpha": 0.3}
+    return {"lw": 2.2} if label == ESKF else {"lw": 1.0}
+
+
 def from_above(
     trajectories: Mapping[str, Trajectory], loops: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]] = ()
 ) -> str:
@@ -62,8 +69,7 @@ def from_above(
         axes.plot([], [], color="#2a8f5b", lw=1.6, label="loop")
     for label, trajectory in trajectories.items():
         p = trajectory.poses.position[_thinned(len(trajectory))]
-        wide: dict[str, Any] = {"lw": 3.0, "alpha": 0.3} if label == TRUTH else {"lw": 1.2}
-        axes.plot(p[:, 0], -p[:, 2], color=colour_of(label, list(trajectories)), label=label, **wide)
+        axes.plot(p[:, 0], -p[:, 2], color=colour_of(label, list(trajectories)), label=label, **_line(label))
     first = next(iter(trajectories.values())).poses.position[0]
     axes.plot(first[0], -first[2], "D", color="#222222", ms=5, label="start")
     _prepared(axes, "X, right [m]", "-Z, forward [m]")
@@ -79,8 +85,7 @@ def from_the_side(trajectories: Mapping[str, Trajectory]) -> str:
         p = trajectory.poses.position
         way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
         chosen = _thinned(len(p))
-        wide: dict[str, Any] = {"lw": 3.0, "alpha": 0.3} if label == TRUTH else {"lw": 1.2}
-        axes.plot(way[chosen], p[chosen, 1], color=colour_of(label, list(trajectories)), label=label, **wide)
+        axes.plot(way[chosen], p[chosen, 1], color=colour_of(label, list(trajectories)), label=label, **_line(label))
     _prepared(axes, "way driven [m]", "Y, up [m]")
     axes.legend(fontsize=9)
     return svg(figure)
@@ -92,7 +97,7 @@ def over_time(series: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64
     figure.suptitle(title, fontsize=11)
     for label, (seconds, values) in series.items():
         chosen = _thinned(len(values))
-        axes.plot(seconds[chosen], values[chosen], lw=1.2, color=colour_of(label, list(series)), label=label)
+        axes.plot(seconds[chosen], values[chosen], color=colour_of(label, list(series)), label=label, **_line(label))
     _prepared(axes, "time [s]", y)
     axes.set_ylim(bottom=0.0)
     axes.legend(fontsize=9)
@@ -132,10 +137,10 @@ def milliseconds(seconds: NDArray[np.float64], values: NDArray[np.float64]) -> s
     figure, axes = pyplot.subplots(figsize=(12.4, 3.0), layout="constrained")
     chosen = _thinned(len(values))
     axes.plot(seconds[chosen], values[chosen], ".", ms=2.5, color="#1f6fb4", alpha=0.6)
-    for ratio, name in ((50, "median"), (99, "99 %")):
+    for ratio, name, side in ((50, "median", "top"), (99, "99 %", "bottom")):
         level = float(np.percentile(values, ratio))
         axes.axhline(level, color="#c2410c", lw=0.9)
-        axes.annotate(f"{name} {level:.2f} ms", (seconds[-1], level), ha="right", va="bottom", fontsize=9)
+        axes.annotate(f"{name} {level:.2f} ms", (seconds[-1], level), ha="right", va=side, fontsize=9)
     _prepared(axes, "time [s]", "front end [ms]")
     axes.set_yscale("log")
     axes.set_ylim(bottom=0.01)
@@ -178,7 +183,7 @@ def bars(groups: Mapping[str, Mapping[str, float]], title: str, unit: str) -> st
     axes.set_xticks(range(len(groups)), list(groups), rotation=0 if len(groups) < 4 else 30, fontsize=9)
     _prepared(axes, "", unit)
     axes.grid(axis="x", visible=False)
-    axes.legend(fontsize=9)
+    figure.legend(loc="outside lower center", ncols=len(labels), fontsize=9, frameon=False)
     return svg(figure)
 
 

@@ -22,7 +22,8 @@ svg, img { max-width: 100%; height: auto; display: block; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 14px; }
 .wide { overflow-x: auto; }
 th, td { padding: 4px 12px 4px 0; text-align: right; border-bottom: 1px solid #e6e9ed; white-space: nowrap; }
-th:first-child, td:first-child, td.text { text-align: left; } th { color: #5b6673; font-weight: 600; }
+th:first-child, td:first-child, td.text { text-align: left; } th { color: #5b6673; font-weight: 600;
+  white-space: normal; overflow-wrap: break-word; vertical-align: bottom; }
 .warn { border-left: 4px solid #c2410c; } .good { border-left: 4px solid #15803d; }
 .plain { border-left: 4px solid #8a94a0; }
 p.note { margin: 6px 0; padding: 4px 12px; background: #f7f8fa; }

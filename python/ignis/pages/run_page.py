@@ -107,9 +107,35 @@ def _remarks(run: Run) -> str:
                     "warn",
                 )
             )
+    notes += _graph_remarks(live["graph"])
     if run.report["loops_kept"] == 0:
         notes.append(html.note("No loop was kept: without one, smoothing changes positions but little."))
     return html.section("In words", *notes)
+
+
+def _graph_remarks(graph: dict[str, Any]) -> list[str]:
+    """Whether the replay's back end published what the live one had."""
+    names = {
+        "keyframes": "keyframe messages",
+        "revisions": "messages of corrected poses",
+        "loop_results": "loop results",
+        "smoothed_states": "smoothed states",
+    }
+    notes = []
+    for key, name in names.items():
+        channel = graph[key]
+        if channel["recorded"] == 0:
+            continue
+        text = f"{channel['equal']} of {channel['recorded']} {name} of the live run are equal bit for bit"
+        if channel["first_unequal_s"] is None:
+            notes.append(html.note(text + ".", "good"))
+        else:
+            notes.append(html.note(f"{text}; the first that differs is of {channel['first_unequal_s']:.3f} s.", "warn"))
+    if graph["first_command_s"] is not None:
+        notes.append(
+            html.note(f"At {graph['first_command_s']:.3f} s somebody had a loop taken out of the live graph.", "warn")
+        )
+    return notes
 
 
 def _drawn(run: Run) -> dict[str, Trajectory]:
@@ -192,7 +218,7 @@ def _timing(run: Run) -> str:
             f"{timing[name]['p50_ms']:.3f}",
             f"{timing[name]['p99_ms']:.3f}",
         )
-        for name in ("frontend", "backend", "map")
+        for name in ("frontend", "backend", "batch_optimum", "map")
     ]
     chart = ""
     if run.timing is not None and len(run.timing["utime"]):

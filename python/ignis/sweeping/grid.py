@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ignis.errors import InputError
+from ignis.mounts import refuse_mounts
 
 Changes = tuple[tuple[str, str], ...]
 
@@ -31,6 +32,7 @@ class Task:
 
 def parse_axes(texts: list[str]) -> dict[str, list[str]]:
     """section.key=a,b,c, one a parameter; commas inside of brackets and quotes belong to the value."""
+    refuse_mounts(texts)
     axes: dict[str, list[str]] = {}
     for text in texts:
         key, equals, values = text.partition("=")

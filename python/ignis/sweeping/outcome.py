@@ -22,7 +22,6 @@ _SHOWN = (
     ("nees_position", "NEES pos.", 2),
     ("scans_applied", "applied", 0),
     ("loops_kept", "loops", 0),
-    ("failure", "failure", 0),
 )
 _JUDGED = "smoothed_ate_rmse_m"
 
@@ -63,11 +62,11 @@ def _page(done: list[tuple[Task, Row]], keys: list[str], total: int) -> str:
     pieces = [charts.bars(_means(judged, key), f"mean ATE by {key}", "m") for key in keys if judged]
     if len(keys) == 2 and judged:
         pieces.append(_grid(judged, keys))
-    return html.document(
-        "Sweep", lead,
-        [html.section("By parameter", html.side_by_side(*pieces) if pieces else ""),
-         html.section("All replays", html.table(head, body))],
-    )  # fmt: skip
+    sections = [html.section("By parameter", html.side_by_side(*pieces))] if pieces else []
+    if failed:
+        reasons = [f"{task.title}: {row['failure']}" for task, row in done if row["status"] != "ok"]
+        sections.append(html.section("Failed", *(html.note(reason, "warn") for reason in reasons)))
+    return html.document("Sweep", lead, [*sections, html.section("All replays", html.table(head, body))])
 
 
 def _means(judged: list[tuple[Task, Row]], key: str) -> dict[str, dict[str, float]]:

@@ -113,5 +113,11 @@ def _replay(task: Task, folder: Path) -> str:
             _running.discard(process)
     if process.returncode in (0, 3):
         return ""
-    last = said.splitlines()[-1] if said else "no message"
-    return f"lio_replay ended with code {process.returncode}: {last}"
+    return f"lio_replay ended with code {process.returncode}: {complaint_in(said)}"
+
+
+def complaint_in(said: str) -> str:
+    """The line in which lio_replay says what is wrong, from among its progress; else its last words."""
+    lines = said.splitlines() or ["no message"]
+    complaints = [line for line in lines if line.startswith("lio_replay: ")]
+    return complaints[0].removeprefix("lio_replay: ") if complaints else lines[-1]

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backend/shadow_schedule.h"
+
+#include <algorithm>
+
+namespace ignis {
+namespace {
+
+bool is_in_or_out(const LoopResult& loop) { return loop.accepted() || loop.reason == LoopReason::kWithdrawn; }
+
+}  // namespace
+
+int shadow_delay(int keyframes) { return 1 + keyframes / 50; }
+
+void ShadowSchedule::note(const SmootherUpdate& update) {
+  loops_changed_ |= (update.loop && is_in_or_out(*update.loop)) || std::ranges::any_of(update.changed, is_in_or_out);
+}
+
+void ShadowSchedule::begin(int keyframes) {
+  loops_changed_ = false;
+  due_at_ = keyframes + shadow_delay(keyframes);
+}
+
+}  // namespace ignis
