@@ -12,7 +12,7 @@ namespace ignis {
 /// aside until a second one carries on from it.
 class LeapGuard {
  public:
-  /// True when `utime` lies more than a second behind `newest` and nothing has confirmed that yet.
+  /// True when `utime` lies more than a second ahead of `newest` and nothing has confirmed that yet.
   bool leaps_ahead(Utime newest, Utime utime) {
     if (utime - newest <= kMicrosPerSecond) {
       put_aside_.reset();

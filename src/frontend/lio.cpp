@@ -9,6 +9,7 @@
 #include "frontend/reacquisition.h"
 #include "frontend/scan_selection.h"
 #include "frontend/standstill.h"
+#include "frontend/start_tilt.h"
 #include "frontend/voxel_downsample.h"
 
 namespace ignis {
@@ -393,6 +394,7 @@ void Lio::advance_to(Utime utime) {
     FilterState cautious{filter_.nominal, cautious_};
     predict(cautious, input, dt, config_, noise_scale(next));
     cautious_ = cautious.covariance;
+    widen_by_turn(cautious_, filter_.nominal, input, dt, config_.accel_bias_sigma);
     if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
     predict(filter_, input, dt, config_, noise_scale(next));
     now = step_end;

@@ -15,6 +15,7 @@ struct NeighbourMoments {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();        ///< [m] of (neighbour - query)
   Eigen::Matrix3d sum_outer = Eigen::Matrix3d::Zero();  ///< [m^2]
 
+  /// One neighbour: the reference for LocalMap::gather, which sums rows of four voxels.
   void add(const Eigen::Vector3d& offset, double scan = 0.0) {
     ++count;
     scan_sum += scan;

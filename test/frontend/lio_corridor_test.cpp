@@ -14,19 +14,17 @@ namespace {
 using test::Drive;
 using test::LioRun;
 
-constexpr double kEnd = 10.0;      // m ahead
-constexpr double kSeconds = 10.0;  // of which 2.5 at rest
-
-test::World closed_corridor() {
+test::World closed_corridor(double end_m = 10.0) {
   test::World world = test::bare_corridor();
-  world.room.lo.z() = -kEnd;
+  world.room.lo.z() = -end_m;
   return world;
 }
 
-Drive drive_in(const test::World& world, std::uint32_t seed) {
+/// At rest for 2.5 s, then at 1 m/s.
+Drive drive_in(const test::World& world, std::uint32_t seed, double seconds = 10.0) {
   test::Sensors sensors;
   sensors.range_sigma = 0.02;
-  return test::simulate(world, test::straight_drive(2.5, 1.0), kSeconds, sensors, seed);
+  return test::simulate(world, test::straight_drive(2.5, 1.0), seconds, sensors, seed);
 }
 
 struct Along {

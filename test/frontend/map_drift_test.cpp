@@ -110,6 +110,14 @@ TEST_F(Drifted, APlaneOfTheNewestScansIsHeldToTheNewestThatIsRemembered) {
   EXPECT_NEAR(variances().z(), 4.0, 1e-12);
 }
 
+TEST_F(Drifted, PlanesAreSureSinceThePositionWasAsWellKnownAsNow) {
+  const Eigen::Matrix3d now = 4.01 * Eigen::Matrix3d::Identity();
+  EXPECT_EQ(drift.sure_since(now, 3.0), 0) << "within three metres all of them";
+  EXPECT_EQ(drift.sure_since(now, 1.9), 11);
+  EXPECT_EQ(drift.sure_since(now, 0.15), 111);
+  EXPECT_EQ(drift.sure_since(now, 0.05), 211);
+}
+
 TEST_F(Drifted, ANewMapForgetsThePlacesOfTheOld) {
   drift.remember(1, 0.25 * Eigen::Matrix3d::Identity());
   drift.hold_to(300.0, along, kStart);

@@ -61,7 +61,9 @@ TEST(SalientPoints, AnEndWallIsSalientAndTheWallsAlongTheAxisAreNot) {
   EXPECT_LT(salient_share(0.5 * std::numbers::pi, 6, 3), 0.03) << "few neighbours, and still";
 }
 
-TEST(SalientPoints, APlaneThatLeansALittleIsNot) { EXPECT_LT(salient_share(0.5 * std::numbers::pi - 0.1, 40, 4), 0.005); }
+TEST(SalientPoints, APlaneThatLeansALittleIsNot) {
+  EXPECT_LT(salient_share(0.5 * std::numbers::pi - 0.1, 40, 4), 0.005);
+}
 
 TEST(SalientPoints, FewNeighboursAreNot) {
   std::mt19937 random(5);

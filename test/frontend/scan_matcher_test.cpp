@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/scan_matcher.h"
 
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -40,6 +42,66 @@ TEST_F(ScanMatcherTest, ACovarianceThatIsNoNumberIsANumericalFailureAndChangesNo
   EXPECT_EQ(result.stats.reason, ScanReason::kNumericalFailure);
   EXPECT_EQ(result.filter.nominal.T_odom_body.translation, predicted_.nominal.T_odom_body.translation);
   EXPECT_TRUE(result.information_body.isZero());
+}
+
+/// A standing sensor 8 m from the end of a corridor whose axis the scan as a whole is held to say nothing about.
+class CorridorEnd : public ::testing::Test {
+ protected:
+  CorridorEnd() {
+    test::World world = test::bare_corridor();
+    world.room.lo.z() = -8.0;
+    const test::Drive drive = test::simulate(world, test::straight_drive(10.0, 0.0), 3.0, test::Sensors{}, 3);
+    for (std::size_t i = 0; i < 58; ++i) {
+      std::vector<Eigen::Vector3f> points;
+      for (const ScanPoint& point : drive.scans[i].points) points.push_back(point.position);
+      if (i < 40) {
+        map_.insert(points, Pose(), true);
+      } else {
+        scans_.push_back(points);
+      }
+    }
+    config_.degeneracy_signal_to_noise = 8.0;
+    predicted_.covariance = 1e-4 * Matrix15d::Identity();
+    predicted_.nominal.T_odom_body.translation.z() = 0.02;
+  }
+
+  [[nodiscard]] MatchResult match(int salient_since = 0) const {
+    ScanMatcher matcher(config_);
+    MatchResult result;
+    for (const auto& scan : scans_) {
+      result = matcher.match(predicted_, predicted_.nominal.T_odom_body, scan, map_, salient_since);
+    }
+    return result;
+  }
+
+  FrontendConfig config_ = test::tuned_config();
+  LocalMap map_{config_};
+  std::vector<std::vector<Eigen::Vector3f>> scans_;
+  FilterState predicted_;
+};
+
+TEST_F(CorridorEnd, HoldsTheAxisByItsPointsAlone) {
+  const MatchResult with = match();
+  ASSERT_TRUE(with.stats.applied());
+  EXPECT_GE(with.salient.constraints.count, 3);
+  EXPECT_EQ(with.stats.degenerate_directions, 0);
+  EXPECT_LT(std::abs(with.filter.nominal.T_odom_body.translation.z()), 0.01);
+  const Eigen::Matrix3d information = with.salient.constraints.information.bottomRightCorner<3, 3>();
+  EXPECT_GT(information(2, 2), 1e3);
+  EXPECT_LT(information(0, 0) + information(1, 1), 0.01 * information(2, 2)) << "along the blind direction only";
+  EXPECT_GT(with.salient.mean_scan, 1.0);
+  EXPECT_LE(with.salient.mean_scan, map_.scans());
+}
+
+TEST_F(CorridorEnd, IsLeftOutWhenItWasMappedBeforeThePoseCouldMoveAgainstIt) {
+  const MatchResult without = match(map_.scans() + 1);
+  EXPECT_EQ(without.salient.constraints.count, 0);
+  EXPECT_EQ(without.stats.degenerate_directions, 1);
+}
+
+TEST_F(CorridorEnd, IsTakenForChanceBelowTheShareThatIsAskedFor) {
+  config_.salient_share = 0.5;
+  EXPECT_EQ(match().salient.constraints.count, 0);
 }
 
 }  // namespace
