@@ -261,22 +261,23 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
 }
 
 SalientPart ScanMatcher::find_salient(const FilterState& at) {
-  SalientPart part;
+  int found = 0;
+  double scan_sum = 0.0;
   const std::vector<Eigen::Vector3d> axes = blind_shifts(degeneracy_);
   const auto counts = [&](const Constraint& constraint) {
     const bool salient = constraint.plane.mean_scan >= salient_since_ &&
                          is_salient(constraint.plane, axes, pooled_variance_, config_.salient_sigma);
-    if (salient) part.mean_scan += constraint.plane.mean_scan;
+    if (salient) {
+      ++found;
+      scan_sum += constraint.plane.mean_scan;
+    }
     return salient;
   };
-  part.constraints = accumulate(at.nominal.T_odom_body, at.covariance.topLeftCorner<6, 6>(), counts);
-  const int count = part.constraints.count;
-  const double share = count / static_cast<double>(constraints_.size());
+  const PoseInformation sum = accumulate(at.nominal.T_odom_body, at.covariance.topLeftCorner<6, 6>(), counts);
+  const double share = sum.count / static_cast<double>(constraints_.size());
   salient_share_ += kShareOfNewestScan * (share - salient_share_);
-  if (count == 0 || salient_share_ < config_.salient_share) return {};
-  part.mean_scan /= count;
-  part.constraints = part.constraints.projected(degeneracy_.blind_part);
-  return part;
+  if (sum.count == 0 || salient_share_ < config_.salient_share) return {};
+  return {sum.projected(degeneracy_.blind_part), scan_sum / found};
 }
 
 /// Kept apart from the step along all other directions, since a direction that is off by a degree mixes them: what is
