@@ -96,7 +96,9 @@ TEST(Smoother, WantsKeyframesInOrder) {
   EXPECT_TRUE(duplicate.moved.empty());
   EXPECT_EQ(smoother.all_poses().size(), 5U);
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(poses_of(smoother)[i].translation, before[i].translation);
-  for (std::size_t i = 5; i < 8; ++i) EXPECT_TRUE(smoother.add_keyframe(drive.keyframes[i]).accepted());
+  for (std::size_t i = 5; i < 8; ++i) {
+    EXPECT_EQ(smoother.add_keyframe(drive.keyframes[i]).verdict, KeyframeVerdict::kAccepted);
+  }
   EXPECT_EQ(smoother.stats().gaps, 1);
   EXPECT_EQ(smoother.stats().duplicates, 1);
 }

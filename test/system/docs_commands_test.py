@@ -113,7 +113,9 @@ def test_command_runs_as_the_page_shows_it(scratch: Path, page: str, command: st
         os.killpg(process.pid, signal.SIGINT)
         output, _ = process.communicate(timeout=30.0)
         assert endless, f"{page}: {command}\n{output}"
-        assert process.returncode in (0, 130, -signal.SIGINT), f"{page}: {command}\n{output}"
+        # A recording that missed datagrams, as on a machine short of time, says so and ends with 3.
+        missed = {3} if "messages are missing by their running numbers" in output else set()
+        assert process.returncode in {0, 130, -signal.SIGINT} | missed, f"{page}: {command}\n{output}"
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
