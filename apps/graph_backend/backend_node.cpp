@@ -8,6 +8,7 @@
 #include "ignis/graph_command_t.hpp"
 #include "runtime/channels.h"
 
+#include "messages/graph_revision.h"
 namespace ignis {
 namespace {
 

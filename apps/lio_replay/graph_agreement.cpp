@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "messages/graph_messages.h"
+#include "messages/graph_revision.h"
 #include "messages/odometry_messages.h"
 
 namespace ignis {

@@ -28,23 +28,6 @@ void append_pose(const KeyframePose& pose, smoothed_keyframes_t& message) {
 
 }  // namespace
 
-GraphRevision revision_of(const Smoother& smoother, const SmootherUpdate& update, std::int32_t session, Utime utime) {
-  return {.utime = utime,
-          .session = session,
-          .revision = smoother.revision(),
-          .full = false,
-          .keyframes = smoother.stats().keyframes,
-          .newest_id = smoother.expected_id() - 1,
-          .T_map_odom = smoother.T_map_odom(),
-          .covariance = update.covariance,
-          .poses = update.moved};
-}
-
-void list_all(GraphRevision& revision, const Smoother& smoother) {
-  revision.full = true;
-  revision.poses = smoother.all_poses();
-}
-
 state_t smoothed_state(NavState state, std::int32_t session, const Pose& T_map_odom) {
   state.T_odom_body = T_map_odom * state.T_odom_body;
   state.v_odom = T_map_odom.rotation * state.v_odom;

@@ -7,7 +7,7 @@
 
 #include "backend/keyframe_pose.h"
 #include "backend/loop_result.h"
-#include "backend/smoother.h"
+#include "common/nav_state.h"
 #include "common/time.h"
 #include "ignis/loop_result_t.hpp"
 #include "ignis/smoothed_keyframes_t.hpp"
@@ -29,13 +29,6 @@ struct GraphRevision {
   Matrix6d covariance = Matrix6d::Zero();  ///< of the newest pose in map; attitude then position, body axes
   std::vector<KeyframePose> poses;
 };
-
-/// What an update changed. `smoother` is the one that made it, `utime` [us] the stamp of its newest keyframe.
-[[nodiscard]] GraphRevision revision_of(const Smoother& smoother, const SmootherUpdate& update, std::int32_t session,
-                                        Utime utime);
-
-/// Makes it a full one: lists every keyframe of the graph.
-void list_all(GraphRevision& revision, const Smoother& smoother);
 
 /// A revision as numbered parts of one datagram each; the sender sets one `sequence` for all of them.
 [[nodiscard]] std::vector<smoothed_keyframes_t> to_messages(const GraphRevision& revision);

@@ -8,6 +8,7 @@
 
 #include "backend/synthetic_drive.h"
 #include "messages/graph_messages.h"
+#include "messages/graph_revision.h"
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
 
