@@ -6,9 +6,9 @@
 
 #include "backend/keyframe_check.h"
 #include "ignis/graph_command_t.hpp"
+#include "messages/graph_revision.h"
 #include "runtime/channels.h"
 
-#include "messages/graph_revision.h"
 namespace ignis {
 namespace {
 

@@ -9,7 +9,6 @@
 #include "frontend/reacquisition.h"
 #include "frontend/scan_selection.h"
 #include "frontend/standstill.h"
-#include "frontend/start_tilt.h"
 #include "frontend/voxel_downsample.h"
 
 namespace ignis {
@@ -18,10 +17,7 @@ namespace {
 constexpr std::size_t kMaxPendingScans = 40;               // two seconds of L1 scans without IMU
 constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a scan but a broken stamp
 constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
-constexpr std::int64_t kCoastingStepUs = 10'000;           // between samples that stand in for a silent IMU
-constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sample the biases learn nothing
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
-constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 
@@ -321,26 +317,6 @@ void Lio::begin_new_map() {
   trust_.note_loss();
 }
 
-/// Samples that keep velocity and turn rate, up to an instant that the IMU has not reached. The biases learn nothing
-/// from them.
-void Lio::coast_to(Utime utime) {
-  if (!running_ || imu_.empty()) return;
-  while (imu_.newest() < utime) {
-    ImuSample sample;
-    sample.utime = imu_.newest() + kCoastingStepUs;
-    sample.gyro = live_.angular_rate + live_.gyro_bias;
-    sample.accel =
-        live_.T_odom_body.rotation.conjugate() * Eigen::Vector3d(0.0, config_.gravity_m, 0.0) + live_.accel_bias;
-    imu_.add_coasting(sample);
-    last_clipped_ = sample.utime;
-    live_ = predict_nominal(live_, {sample.gyro, sample.accel}, 1e-6 * kCoastingStepUs, config_.gravity_m);
-    live_.utime = sample.utime;
-  }
-}
-
-/// True while the filter's own samples, clipped or coasting, would teach the biases what is not so.
-bool Lio::learns_nothing() const { return last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs; }
-
 /// Undoes what a scan did to the biases. Their correlations with the rest are given up, which only widens the rest.
 void Lio::keep_biases(const FilterState& predicted) {
   filter_.nominal.gyro_bias = predicted.nominal.gyro_bias;
@@ -374,52 +350,6 @@ void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Sca
                     .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
                     .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
                     .accel_bias_sigma = std::sqrt(filter_.covariance.diagonal().segment<3>(kAccelBias).maxCoeff())});
-}
-
-void Lio::advance_to(Utime utime) {
-  const std::vector<ImuSample>& samples = imu_.samples();
-  Utime& now = filter_.nominal.utime;
-  if (utime <= now) return;
-  auto next = static_cast<std::size_t>(std::ranges::upper_bound(samples, now, {}, &ImuSample::utime) - samples.begin());
-  for (; now < utime && next < samples.size(); ++next) {
-    const ImuSample& before = samples[next - 1];
-    const ImuSample& after = samples[next];
-    if (before.utime == now) keyframer_.add_imu(before);
-    if (imu_.gap_before(next)) keyframer_.note_gap();
-    const Utime step_end = std::min(utime, after.utime);
-    const ImuSample first = interpolate(before, after, now);
-    const ImuSample last = interpolate(before, after, step_end);
-    const InertialInput input = midpoint(first, last);
-    const double dt = seconds_between(now, step_end);
-    FilterState cautious{filter_.nominal, cautious_};
-    predict(cautious, input, dt, config_, noise_scale(next));
-    cautious_ = cautious.covariance;
-    widen_by_turn(cautious_, filter_.nominal, input, dt, config_.accel_bias_sigma);
-    if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
-    predict(filter_, input, dt, config_, noise_scale(next));
-    now = step_end;
-    if (unaided_) unaided_->nominal.utime = now;
-  }
-}
-
-double Lio::noise_scale(std::size_t sample_after) const {
-  const bool clipped = imu_.samples()[sample_after].saturated || imu_.samples()[sample_after - 1].saturated;
-  // Across a gap two samples stand for many: the variance of their mean does not shrink with the time between them.
-  const double gap = imu_.gap_before(sample_after) ? imu_.periods_before(sample_after) : 1.0;
-  return gap * (clipped ? kSaturatedNoiseScale : 1.0);
-}
-
-void Lio::rebuild_live_state() {
-  const std::vector<ImuSample>& samples = imu_.samples();
-  live_ = filter_.nominal;
-  auto next =
-      static_cast<std::size_t>(std::ranges::upper_bound(samples, live_.utime, {}, &ImuSample::utime) - samples.begin());
-  for (; next < samples.size(); ++next) {
-    const ImuSample first = interpolate(samples[next - 1], samples[next], live_.utime);
-    live_ = predict_nominal(live_, midpoint(first, samples[next]), seconds_between(live_.utime, samples[next].utime),
-                            config_.gravity_m);
-    live_.utime = samples[next].utime;
-  }
 }
 
 }  // namespace ignis

@@ -90,6 +90,20 @@ TEST(Lio, CovarianceOfVelocityIsHonest) {
   EXPECT_LT(nees, 4.0);
 }
 
+TEST(Lio, ATurnWidensThePublishedAccelerometerBias) {
+  FrontendConfig config;
+  config.use_scan_matching = false;
+  config.zero_velocity_sigma = 0.0;
+  const auto variance_at_end = [&](const test::Trajectory& truth) {
+    const LioRun run = run_lio(config, test::simulate(test::furnished_hall(), truth, 20.0, Sensors{}, 1));
+    return run.scans.back().covariance(kAccelBias, kAccelBias);
+  };
+  const double straight = variance_at_end(test::straight_drive(2.0, 1.0));
+  const double turning = variance_at_end(test::ellipse_drive(2.0, 2.0, 2.0, 1.0));
+  // Eighteen seconds at half a radian a second, of which 0.1 counts as noise.
+  EXPECT_GT(turning - straight, 0.5 * config.accel_bias_sigma * config.accel_bias_sigma * 18.0 * 0.4);
+}
+
 TEST(Lio, CorridorLeavesItsAxisToTheImuAndSaysSoAboveTheThreshold) {
   const Drive drive = test::simulate(test::bare_corridor(), test::straight_drive(2.5, 1.0), 8.0, Sensors{}, 1);
   FrontendConfig config;
