@@ -21,7 +21,7 @@ namespace {
 /// A prediction as good as one between two scans: 5 mm, 0.5 mrad.
 FilterState prediction(const RecordedDrive& drive) {
   FilterState filter{.nominal = drive.states.back()};
-  filter.covariance = Matrix15d::Identity() * 1e-6;
+  filter.covariance = ErrorCovariance::Identity() * 1e-6;
   filter.covariance.block<3, 3>(kPosition, kPosition) *= 25.0;
   filter.covariance.block<3, 3>(kVelocity, kVelocity) *= 100.0;
   filter.nominal.T_odom_body.translation += Eigen::Vector3d(0.004, -0.002, 0.002);
@@ -169,7 +169,7 @@ void update_step(benchmark::State& state) {
     h << std::sin(angle), std::cos(2 * angle), std::sin(3 * angle), std::cos(angle), std::sin(2 * angle), 0.5;
     constraints.add(h, 0.01 * std::sin(7 * angle), 1e-4);
   }
-  const Vector15d deviation = Vector15d::Constant(1e-4);
+  const ErrorVector deviation = ErrorVector::Constant(1e-4);
   for (auto _ : state) benchmark::DoNotOptimize(information_update(filter.covariance, deviation, constraints));
   state.SetItemsProcessed(state.iterations());
 }

@@ -22,6 +22,7 @@ void transfer(auto& io, FieldsOf<NavState> auto& state) {
   io.matrix(state.gyro_bias);
   io.matrix(state.accel_bias);
   io.matrix(state.angular_rate);
+  io.matrix(state.gravity_tilt);
 }
 
 void transfer(auto& io, FieldsOf<CloudPoint> auto& point) {

@@ -11,7 +11,7 @@ using Block = Eigen::Matrix3d;
 Eigen::Vector3d acceleration_odom(const NavState& state, const InertialInput& input, double dt, double gravity) {
   const Eigen::Vector3d rate = input.gyro - state.gyro_bias;
   const Eigen::Quaterniond q_mid = state.T_odom_body.rotation * so3::exp(0.5 * dt * rate);
-  return q_mid * (input.accel - state.accel_bias) - Eigen::Vector3d(0.0, gravity, 0.0);
+  return q_mid * (input.accel - state.accel_bias) + gravity * state.gravity_direction();
 }
 
 }  // namespace
@@ -31,7 +31,7 @@ ImuSample interpolate(const ImuSample& a, const ImuSample& b, Utime utime) {
   return sample;
 }
 
-NavState perturbed(const NavState& state, const Vector15d& error) {
+NavState perturbed(const NavState& state, const ErrorVector& error) {
   NavState moved = state;
   moved.T_odom_body.rotation = (state.T_odom_body.rotation * so3::exp(error.segment<3>(kAttitude))).normalized();
   moved.T_odom_body.translation += error.segment<3>(kPosition);
@@ -39,16 +39,18 @@ NavState perturbed(const NavState& state, const Vector15d& error) {
   moved.gyro_bias += error.segment<3>(kGyroBias);
   moved.accel_bias += error.segment<3>(kAccelBias);
   moved.angular_rate -= error.segment<3>(kGyroBias);
+  moved.gravity_tilt += error.segment<2>(kGravityTilt);
   return moved;
 }
 
-Vector15d difference(const NavState& from, const NavState& to) {
-  Vector15d error;
+ErrorVector difference(const NavState& from, const NavState& to) {
+  ErrorVector error;
   error.segment<3>(kAttitude) = so3::log(from.T_odom_body.rotation.conjugate() * to.T_odom_body.rotation);
   error.segment<3>(kPosition) = to.T_odom_body.translation - from.T_odom_body.translation;
   error.segment<3>(kVelocity) = to.v_odom - from.v_odom;
   error.segment<3>(kGyroBias) = to.gyro_bias - from.gyro_bias;
   error.segment<3>(kAccelBias) = to.accel_bias - from.accel_bias;
+  error.segment<2>(kGravityTilt) = to.gravity_tilt - from.gravity_tilt;
   return error;
 }
 
@@ -72,7 +74,15 @@ NavState predict_backward(const NavState& state, const InertialInput& input, dou
   return before;
 }
 
-Matrix15d transition(const NavState& state, const InertialInput& input, double dt) {
+Eigen::Matrix<double, 3, 2> gravity_direction_by_tilt(const NavState& state) {
+  Eigen::Matrix<double, 3, 2> derivative = Eigen::Matrix<double, 3, 2>::Zero();
+  derivative(0, 0) = 1.0;
+  derivative.row(1) = -state.gravity_tilt.transpose() / state.gravity_direction().y();
+  derivative(2, 1) = 1.0;
+  return derivative;
+}
+
+ErrorCovariance transition(const NavState& state, const InertialInput& input, double dt, double gravity) {
   const Eigen::Vector3d phi = dt * (input.gyro - state.gyro_bias);
   const Eigen::Vector3d force = input.accel - state.accel_bias;
   const Block half_turn = so3::exp(0.5 * phi).toRotationMatrix();
@@ -82,7 +92,7 @@ Matrix15d transition(const NavState& state, const InertialInput& input, double d
   const Block accel_by_attitude = -R * so3::skew(half_turn * force);
   const Block accel_by_gyro_bias = 0.5 * dt * R_mid * so3::skew(force) * so3::right_jacobian(0.5 * phi);
 
-  Matrix15d F = Matrix15d::Identity();
+  ErrorCovariance F = ErrorCovariance::Identity();
   F.block<3, 3>(kAttitude, kAttitude) = so3::exp(-phi).toRotationMatrix();
   F.block<3, 3>(kAttitude, kGyroBias) = -dt * so3::right_jacobian(phi);
   F.block<3, 3>(kPosition, kVelocity) = dt * Block::Identity();
@@ -92,28 +102,48 @@ Matrix15d transition(const NavState& state, const InertialInput& input, double d
   F.block<3, 3>(kVelocity, kAttitude) = dt * accel_by_attitude;
   F.block<3, 3>(kVelocity, kGyroBias) = dt * accel_by_gyro_bias;
   F.block<3, 3>(kVelocity, kAccelBias) = -dt * R_mid;
+  F.block<3, 2>(kVelocity, kGravityTilt) = dt * gravity * gravity_direction_by_tilt(state);
+  F.block<3, 2>(kPosition, kGravityTilt) = 0.5 * dt * F.block<3, 2>(kVelocity, kGravityTilt);
   return F;
 }
 
 void predict(FilterState& filter, const InertialInput& input, double dt, const FrontendConfig& config,
              double noise_scale) {
   if (dt <= 0.0) return;
-  const Matrix15d F = transition(filter.nominal, input, dt);
+  const ErrorCovariance F = transition(filter.nominal, input, dt, config.gravity_m);
 
   // White noise of a sample enters the step where its bias does, so the bias columns of F are its input matrix.
   Eigen::Matrix<double, 9, 6> G = F.block<9, 6>(0, kGyroBias);
   G.leftCols<3>() *= config.imu_noise_gyro * std::sqrt(noise_scale / dt);
   G.rightCols<3>() *= config.imu_noise_accel * std::sqrt(noise_scale / dt);
 
-  Matrix15d P = F * filter.covariance * F.transpose();
-  P.topLeftCorner<9, 9>() += G * G.transpose();
+  // Biases and gravity stay as they are: the rows of F below the ninth are those of the identity.
+  constexpr int kMoving = 9;
+  constexpr int kConstant = kErrorSize - kMoving;
+  const auto F_moving = F.topRows<kMoving>();
+  const Eigen::Matrix<double, kMoving, kErrorSize> FP = F_moving * filter.covariance;
+  ErrorCovariance P = filter.covariance;
+  P.topLeftCorner<kMoving, kMoving>() = FP * F_moving.transpose() + G * G.transpose();
+  P.topRightCorner<kMoving, kConstant>() = FP.rightCols<kConstant>();
+  P.bottomLeftCorner<kConstant, kMoving>() = FP.rightCols<kConstant>().transpose();
   P.diagonal().segment<3>(kGyroBias).array() += config.gyro_bias_walk * config.gyro_bias_walk * dt;
   P.diagonal().segment<3>(kAccelBias).array() += config.accel_bias_walk * config.accel_bias_walk * dt;
   filter.covariance = 0.5 * (P + P.transpose());
   filter.nominal = predict_nominal(filter.nominal, input, dt, config.gravity_m);
 }
 
-bool make_symmetric(Matrix15d& covariance) {
+Eigen::Matrix3d rest_acceleration_covariance(const FilterState& filter, double gravity) {
+  const NavState& state = filter.nominal;
+  const Eigen::Matrix3d R = state.T_odom_body.rotation.toRotationMatrix();
+  const Eigen::Vector3d force_odom = -gravity * state.gravity_direction();
+  Eigen::Matrix<double, 3, kErrorSize> J = Eigen::Matrix<double, 3, kErrorSize>::Zero();
+  J.middleCols<3>(kAttitude) = -so3::skew(force_odom) * R;
+  J.middleCols<3>(kAccelBias) = -R;
+  J.middleCols<2>(kGravityTilt) = gravity * gravity_direction_by_tilt(state);
+  return J * filter.covariance * J.transpose();
+}
+
+bool make_symmetric(ErrorCovariance& covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
   return covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0;
 }

@@ -6,15 +6,16 @@
 #include <numbers>
 
 #include "common/frames.h"
-#include "common/so3.h"
 
 namespace ignis {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-// Position and yaw of the first state are definitions, not measurements; a covariance still has to be invertible.
+// The first pose defines frame odom; a covariance still has to be invertible. That this frame may not be level is
+// gravity's tilt in it.
 constexpr double kPositionSigma = 1e-3;      // m
-constexpr double kYawSigma = 1e-3;           // rad
+constexpr double kAttitudeSigma = 1e-4;      // rad
+constexpr double kWideTilt = 0.5;            // the prior of gravity's: the measurement decides
 constexpr double kRestVelocitySigma = 0.01;  // m/s
 constexpr std::size_t kMinSamples = 2;
 
@@ -26,18 +27,18 @@ Eigen::Quaterniond level_attitude(const Eigen::Vector3d& up_body) {
   return frames::from_yaw_pitch_roll(attitude);
 }
 
-/// Conditions a prior on the measurement "specific force = R^T up g + bias", with variance per axis. Corrects the
-/// state.
+/// Conditions a prior on the measurement "specific force = -R^T g + bias", with variance per axis. Corrects the state.
 void condition_on_gravity(FilterState& filter, const Eigen::Vector3d& accel_mean, double gravity, double variance) {
-  const Eigen::Vector3d up_body = filter.nominal.T_odom_body.rotation.conjugate() * (gravity * frames::up());
-  Eigen::Matrix<double, 3, 15> H = Eigen::Matrix<double, 3, 15>::Zero();
-  H.middleCols<3>(kAttitude) = so3::skew(up_body);
+  const Eigen::Matrix3d R_body_odom = filter.nominal.T_odom_body.rotation.conjugate().toRotationMatrix();
+  Eigen::Matrix<double, 3, kErrorSize> H = Eigen::Matrix<double, 3, kErrorSize>::Zero();
   H.middleCols<3>(kAccelBias) = Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d residual = accel_mean - up_body - filter.nominal.accel_bias;
+  H.middleCols<2>(kGravityTilt) = -gravity * R_body_odom * gravity_direction_by_tilt(filter.nominal);
+  const Eigen::Vector3d residual =
+      accel_mean + gravity * R_body_odom * filter.nominal.gravity_direction() - filter.nominal.accel_bias;
   const Eigen::Matrix3d S = H * filter.covariance * H.transpose() + variance * Eigen::Matrix3d::Identity();
-  const Eigen::Matrix<double, 15, 3> K = filter.covariance * H.transpose() * S.inverse();
+  const Eigen::Matrix<double, kErrorSize, 3> K = filter.covariance * H.transpose() * S.inverse();
   filter.nominal = perturbed(filter.nominal, K * residual);
-  const Matrix15d I_KH = Matrix15d::Identity() - K * H;
+  const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
   filter.covariance = I_KH * filter.covariance * I_KH.transpose() + variance * K * K.transpose();
 }
 
@@ -161,17 +162,11 @@ FilterState ImuInitialisation::first_state(const Window& window, bool at_rest) c
   const double gyro_noise = config_.imu_noise_gyro / std::sqrt(window.seconds);
   const double gyro_sigma = at_rest ? std::hypot(gyro_noise, 1e-4) : config_.gyro_bias_sigma;
   const double velocity_sigma = at_rest ? kRestVelocitySigma : config_.moving_velocity_sigma;
-  constexpr double kWideTilt = 0.5;  // rad: the measurement below decides
-  Vector15d sigma;
-  sigma << Eigen::Vector3d::Constant(kWideTilt), Eigen::Vector3d::Constant(kPositionSigma),
+  ErrorVector sigma;
+  sigma << Eigen::Vector3d::Constant(kAttitudeSigma), Eigen::Vector3d::Constant(kPositionSigma),
       Eigen::Vector3d::Constant(velocity_sigma), Eigen::Vector3d::Constant(gyro_sigma),
-      Eigen::Vector3d::Constant(config_.accel_bias_sigma);
+      Eigen::Vector3d::Constant(config_.accel_bias_sigma), Eigen::Vector2d::Constant(kWideTilt);
   filter.covariance = sigma.array().square().matrix().asDiagonal();
-
-  // Yaw is zero by definition: remove its variance about the up axis as it lies in the body.
-  const Eigen::Vector3d up_body = filter.nominal.T_odom_body.rotation.conjugate() * frames::up();
-  filter.covariance.block<3, 3>(kAttitude, kAttitude) +=
-      (kYawSigma * kYawSigma - kWideTilt * kWideTilt) * up_body * up_body.transpose();
 
   double variance = config_.imu_noise_accel * config_.imu_noise_accel / window.seconds;
   if (!at_rest) variance += config_.moving_accel_sigma * config_.moving_accel_sigma;

@@ -12,6 +12,7 @@
 namespace ignis {
 
 /// Finds the first state from IMU samples alone: roll and pitch from gravity, gyro bias (at rest), yaw 0, position 0.
+/// Pose and heading are exact by definition; that the frame which they define may not be level is gravity's tilt in it.
 ///
 /// At rest: waits for `start_seconds` without motion; refuses, with a reason in words, data that move or that look like
 /// wrong units or axes, and goes on waiting. Moving: takes the mean specific force of the same window for gravity,

@@ -17,7 +17,7 @@ Matrix6d to_body(const NavState& state) {
 }
 
 /// Inverse of the covariance of a pose.
-Matrix6d pose_information(const Matrix15d& covariance) {
+Matrix6d pose_information(const ErrorCovariance& covariance) {
   const Matrix6d pose = covariance.topLeftCorner<6, 6>();
   return pose.ldlt().solve(Matrix6d::Identity());
 }
@@ -53,15 +53,15 @@ void IntervalInformation::add_imu(const ImuSample& sample) {
 
 InertialInput IntervalInformation::mean_input() const {
   if (samples_ == 0) {
-    const Eigen::Vector3d up_body = state_.T_odom_body.rotation.conjugate() * Eigen::Vector3d::UnitY();
-    return {state_.angular_rate + state_.gyro_bias, config_.gravity_m * up_body + state_.accel_bias};
+    const Eigen::Vector3d down_body = state_.T_odom_body.rotation.conjugate() * state_.gravity_direction();
+    return {state_.angular_rate + state_.gyro_bias, state_.accel_bias - config_.gravity_m * down_body};
   }
   return {sum_.gyro / samples_, sum_.accel / samples_};
 }
 
 void IntervalInformation::add_scan(const NavState& state, const Matrix6d& information_body) {
   const double dt = seconds_between(state_.utime, state.utime);
-  for (Matrix15d* covariance : {&with_scans_, &without_scans_}) {
+  for (ErrorCovariance* covariance : {&with_scans_, &without_scans_}) {
     FilterState filter{state_, *covariance};
     predict(filter, mean_input(), dt, config_);
     *covariance = filter.covariance;
@@ -72,7 +72,7 @@ void IntervalInformation::add_scan(const NavState& state, const Matrix6d& inform
   if (information_body.isZero(0.0)) return;
   PoseInformation scan;
   scan.information = to_body(state).transpose() * information_body * to_body(state);
-  const UpdateStep update = information_update(with_scans_, Vector15d::Zero(), scan);
+  const UpdateStep update = information_update(with_scans_, ErrorVector::Zero(), scan);
   if (!update.ok) return;
   with_scans_ = update.covariance;
   informed_ = true;

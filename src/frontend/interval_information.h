@@ -33,8 +33,8 @@ class IntervalInformation {
 
   FrontendConfig config_;
   NavState state_;  ///< at the newest scan
-  Matrix15d with_scans_ = Matrix15d::Zero();
-  Matrix15d without_scans_ = Matrix15d::Zero();
+  ErrorCovariance with_scans_ = ErrorCovariance::Zero();
+  ErrorCovariance without_scans_ = ErrorCovariance::Zero();
   InertialInput sum_;  ///< of the samples since the newest scan
   int samples_ = 0;
   bool informed_ = false;  ///< a scan has said something

@@ -93,7 +93,7 @@ Keyframe Keyframer::make(const FilterState& filter) {
   keyframe.id = next_id_;
   keyframe.session = session_;
   keyframe.state = state;
-  keyframe.covariance = filter.covariance;
+  keyframe.covariance = filter.covariance.topLeftCorner<15, 15>();
   keyframe.cloud = merged_cloud(state.T_odom_body);
   keyframe.previous_utime = next_id_ == 0 ? state.utime : last_.utime;
   if (next_id_ > 0) {

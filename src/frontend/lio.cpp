@@ -7,6 +7,7 @@
 
 #include "frontend/deskew.h"
 #include "frontend/reacquisition.h"
+#include "frontend/scan_instant.h"
 #include "frontend/scan_selection.h"
 #include "frontend/standstill.h"
 #include "frontend/voxel_downsample.h"
@@ -20,6 +21,7 @@ constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of t
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
+constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
 
 std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
   std::vector<Eigen::Vector3f> result;
@@ -30,16 +32,6 @@ std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
 
 double velocity_sigma(const FilterState& filter) {
   return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
-}
-
-/// The filter once its attitude is known by definition.
-void condition_on_attitude(FilterState& filter) {
-  constexpr double kVariance = 1e-8;  // rad^2: keeps the covariance invertible
-  const Eigen::Matrix<double, 15, 3> columns = filter.covariance.middleCols<3>(kAttitude);
-  const Eigen::Matrix3d innovation =
-      filter.covariance.block<3, 3>(kAttitude, kAttitude) + kVariance * Eigen::Matrix3d::Identity();
-  filter.covariance -= columns * innovation.inverse() * columns.transpose();
-  (void)make_symmetric(filter.covariance);
 }
 
 }  // namespace
@@ -124,12 +116,7 @@ void Lio::start(const FilterState& first) {
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
   if (!start_note_.empty()) trust_.note_uncertain_start();
-  if (!velocity_known_) return;
-  // The first pose defines the frame of the map; that this frame may not be level is drift, not an error of the pose in
-  // it. Gravity's direction in that frame is then what the accelerometer bias has to account for.
-  drift_.begin(filter_.covariance.block<3, 3>(kAttitude, kAttitude), filter_.nominal.T_odom_body);
-  condition_on_attitude(filter_);
-  cautious_ = filter_.covariance;
+  drift_.begin(filter_);
 }
 
 std::vector<ScanResult> Lio::add_scan(Scan scan) {
@@ -203,16 +190,22 @@ ScanResult Lio::process(const Scan& scan) {
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
   std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m);
-  MatchResult match = correct(cloud, sparse);
+  const double age = mean_age(selection.scan);
+  const double seen_age = age * new_share(filter_.covariance, mapped_velocity_variance_);
+  MatchResult match = correct(cloud, sparse, seen_age);
   match.stats.points = selection.in_range;
   filter_ = match.filter;
   if (learns_nothing()) keep_biases(predicted);
-  count_correction(match);
+  count_correction(match, seen_age);
+  if (age * (filter_.nominal.v_odom - predicted.nominal.v_odom).norm() > kDeskewTolerance) {
+    cloud = register_points(selection.scan);
+    sparse = voxel_downsample(cloud, config_.voxel_size_m);
+  }
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
   seek_confirmation(match.stats.reason);
   match.stats.imu_disagreement = trust_.disagreement();
-  follow_moving_start(selection.scan, match.stats.reason, cloud, sparse);
+  follow_moving_start(match.stats.reason);
   enter_map(cloud, match);
 
   ScanResult result;
@@ -224,12 +217,13 @@ ScanResult Lio::process(const Scan& scan) {
   result.stats.map_points = map_.size();
   result.has_state = true;
   result.state = filter_.nominal;
-  result.covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
-  result.covariance.block<3, 3>(kPosition, kPosition) +=
-      tilt_of_blind_shifts(match.degeneracy, result.covariance.block<3, 3>(kPosition, kPosition));
-  drift_.remember(map_.scans(), result.covariance.block<3, 3>(kPosition, kPosition));
+  FilterState published{filter_.nominal, cautious_};
+  published.covariance.topLeftCorner<6, 6>() += drift_.pose_covariance(filter_.nominal.T_odom_body);
+  auto position_covariance = published.covariance.block<3, 3>(kPosition, kPosition);
+  position_covariance += tilt_of_blind_shifts(match.degeneracy, position_covariance);
+  drift_.remember(map_.scans(), position_covariance);
+  result.covariance = published.covariance.topLeftCorner<15, 15>();
   if (velocity_known_) {
-    const FilterState published{filter_.nominal, result.covariance};
     result.keyframe =
         keyframer_.add_scan(published, match.information_body, std::move(sparse), !trust_.awaits_confirmation());
   }
@@ -237,7 +231,8 @@ ScanResult Lio::process(const Scan& scan) {
   return result;
 }
 
-MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse) {
+/// `age` [s] is that of the points in the mean: of the position at that instant the scan tells.
+MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse, double age) {
   MatchResult result;
   result.filter = filter_;
   if (std::ssize(cloud) < config_.min_scan_points) {
@@ -252,35 +247,41 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
         positions(is_large ? every_nth(sparse, config_.max_scan_points) : cloud);
     const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
     const Pose T_start = is_lost ? reacquire(filter_, points, map_, config_) : filter_.nominal.T_odom_body;
-    const Matrix15d covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
-    const int salient_since = drift_.sure_since(covariance.block<3, 3>(kPosition, kPosition), config_.match_radius_m);
-    result = matcher_.match(filter_, T_start, points, map_, salient_since);
+    const Matrix6d pose_covariance =
+        cautious_.topLeftCorner<6, 6>() + drift_.pose_covariance(filter_.nominal.T_odom_body);
+    const int salient_since = drift_.sure_since(pose_covariance.bottomRightCorner<3, 3>(), config_.match_radius_m);
+    const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
+    result = matcher_.match(seen, T_start, points, map_, salient_since);
+    const Eigen::Vector3d gained = result.filter.nominal.v_odom - filter_.nominal.v_odom;
+    result.filter.nominal.T_odom_body.translation += age * gained;
+    result.filter.covariance = with_position_at(result.filter.covariance, age);
   }
   return result;
 }
 
-void Lio::count_correction(const MatchResult& match) {
+void Lio::count_correction(const MatchResult& match, double age) {
   if (!match.stats.applied()) {
     ++scans_without_correction_;
     return;
   }
   ++applied_scans_;
   scans_without_correction_ = 0;
-  const UpdateStep update = information_update(cautious_, Vector15d::Zero(), match.reliable, match.considered);
-  if (update.ok) cautious_ = update.covariance;
-  if (match.salient.constraints.count == 0) return;
-  const UpdateStep along = information_update(cautious_, Vector15d::Zero(), match.salient.constraints);
-  if (along.ok) cautious_ = along.covariance;
+  ErrorCovariance seen = with_position_at(cautious_, -age);
+  const UpdateStep update = information_update(seen, ErrorVector::Zero(), match.reliable, match.considered);
+  if (update.ok) seen = update.covariance;
+  const bool salient = match.salient.constraints.count > 0;
+  const UpdateStep along =
+      salient ? information_update(seen, ErrorVector::Zero(), match.salient.constraints) : UpdateStep{};
+  if (along.ok) seen = along.covariance;
+  cautious_ = with_position_at(seen, age);
+  if (!salient) return;
   drift_.hold_to(match.salient.mean_scan, blind_shifts(match.degeneracy), filter_.nominal.T_odom_body);
 }
 
-void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,
-                              std::vector<CloudPoint>& sparse) {
+void Lio::follow_moving_start(ScanReason reason) {
   if (velocity_known_) return;
   if (reason == ScanReason::kApplied) {
     // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
-    cloud = register_points(scan);
-    sparse = voxel_downsample(cloud, config_.voxel_size_m);
     map_.clear();
     velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
   } else if (is_contradiction(reason)) {
@@ -293,15 +294,18 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (trust_.awaits_confirmation()) return;
   const bool applied = match.stats.applied();
   if (applied && match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
-  if (applied) drift_.add_scan(cautious_, filter_.nominal.T_odom_body, match.map_age_scans);
-  grow_map(cloud, match.stats.reason);
+  if (applied) drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body, match.map_age_scans);
+  grow_map(cloud, match);
 }
 
-void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {
+void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match) {
+  const ScanReason reason = match.stats.reason;
   if (reason == ScanReason::kTooFewPoints) return;
   contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
   if (contradictions_ >= config_.reanchor_scans) begin_new_map();
   const bool confirmed = contradictions_ == 0 || map_.empty() || !config_.quarantine;
+  const double share = map_.empty() ? 1.0 : 1.0 / std::max(match.map_age_scans, 1.0);
+  mapped_velocity_variance_ += share * (velocity_variance(filter_.covariance) - mapped_velocity_variance_);
   map_.insert(positions(cloud), filter_.nominal.T_odom_body, confirmed);
   map_.slide(filter_.nominal.T_odom_body.translation);
 }
@@ -317,14 +321,17 @@ void Lio::begin_new_map() {
   trust_.note_loss();
 }
 
-/// Undoes what a scan did to the biases. Their correlations with the rest are given up, which only widens the rest.
+/// Undoes what a scan did to the biases and to gravity. Their correlations with the rest are given up, which only
+/// widens the rest.
 void Lio::keep_biases(const FilterState& predicted) {
   filter_.nominal.gyro_bias = predicted.nominal.gyro_bias;
   filter_.nominal.accel_bias = predicted.nominal.accel_bias;
   filter_.nominal.angular_rate = predicted.nominal.angular_rate;
-  filter_.covariance.rightCols<6>().setZero();
-  filter_.covariance.bottomRows<6>().setZero();
-  filter_.covariance.bottomRightCorner<6, 6>() = predicted.covariance.bottomRightCorner<6, 6>();
+  filter_.nominal.gravity_tilt = predicted.nominal.gravity_tilt;
+  constexpr int kKept = kErrorSize - kGyroBias;
+  filter_.covariance.rightCols<kKept>().setZero();
+  filter_.covariance.bottomRows<kKept>().setZero();
+  filter_.covariance.bottomRightCorner<kKept, kKept>() = predicted.covariance.bottomRightCorner<kKept, kKept>();
 }
 
 /// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
@@ -349,7 +356,8 @@ void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Sca
   trust_.note_scan({.stats = stats,
                     .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
                     .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
-                    .accel_bias_sigma = std::sqrt(filter_.covariance.diagonal().segment<3>(kAccelBias).maxCoeff())});
+                    .acceleration_sigma =
+                        std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff())});
 }
 
 }  // namespace ignis

@@ -85,12 +85,12 @@ class Lio {
   [[nodiscard]] std::vector<ScanResult> process_pending();
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
-  [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse);
-  void count_correction(const MatchResult& match);
+  [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
+                                    double age);
+  void count_correction(const MatchResult& match, double age);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
-  void grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason);
-  void follow_moving_start(const Scan& scan, ScanReason reason, std::vector<CloudPoint>& cloud,
-                           std::vector<CloudPoint>& sparse);
+  void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
+  void follow_moving_start(ScanReason reason);
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
   void begin_new_map();
   void coast_to(Utime utime);
@@ -123,9 +123,10 @@ class Lio {
   FilterState filter_;  ///< committed
   /// Covariance of the same state when nothing is believed about directions that scans hardly observe. The filter's own
   /// uses what little they say to correct the state; this one is published and judged by.
-  Matrix15d cautious_ = Matrix15d::Identity();
+  ErrorCovariance cautious_ = ErrorCovariance::Identity();
   NavState live_;
   bool velocity_known_ = false;
+  double mapped_velocity_variance_ = 0.0;  ///< [m^2/s^2] with which the points of the map were deskewed, in the mean
   int applied_scans_ = 0;
   int contradictions_ = 0;                ///< in a row
   int scans_without_correction_ = 0;      ///< in a row
@@ -152,6 +153,7 @@ class Lio {
     io.matrix(lio.cautious_);
     transfer(io, lio.live_);
     io.number(lio.velocity_known_);
+    io.number(lio.mapped_velocity_variance_);
     io.number(lio.applied_scans_);
     io.number(lio.contradictions_);
     io.number(lio.scans_without_correction_);

@@ -20,17 +20,21 @@ Matrix6d attitude_to_odom(const Pose& T_odom_body) {
 
 }  // namespace
 
-void MapDrift::begin(const Eigen::Matrix3d& attitude_covariance_body, const Pose& T_odom_body) {
-  const Eigen::Matrix3d R = T_odom_body.rotation.toRotationMatrix();
+void MapDrift::begin(const FilterState& first) {
+  // Gravity (x, -1, z) is straight down in a frame that is turned by (z, 0, -x).
+  Eigen::Matrix<double, 3, 2> turn_by_tilt = Eigen::Matrix<double, 3, 2>::Zero();
+  turn_by_tilt(0, 1) = 1.0;
+  turn_by_tilt(2, 0) = -1.0;
   covariance_.setZero();
-  covariance_.topLeftCorner<3, 3>() = R * attitude_covariance_body * R.transpose();
-  position_ = T_odom_body.translation;
+  covariance_.topLeftCorner<3, 3>() =
+      turn_by_tilt * first.covariance.block<2, 2>(kGravityTilt, kGravityTilt) * turn_by_tilt.transpose();
+  position_ = first.nominal.T_odom_body.translation;
 }
 
-void MapDrift::add_scan(const Matrix15d& covariance, const Pose& T_odom_body, double age_scans) {
+void MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans) {
   const Matrix6d turn = attitude_to_odom(T_odom_body);
   covariance_ = at(T_odom_body.translation);
-  covariance_ += scale_ / std::max(age_scans, 1.0) * turn * covariance.topLeftCorner<6, 6>() * turn.transpose();
+  covariance_ += scale_ / std::max(age_scans, 1.0) * turn * pose_covariance * turn.transpose();
   position_ = T_odom_body.translation;
 }
 
@@ -63,11 +67,9 @@ void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const
   }
 }
 
-Matrix15d MapDrift::add_to(const Matrix15d& covariance, const Pose& T_odom_body) const {
+Matrix6d MapDrift::pose_covariance(const Pose& T_odom_body) const {
   const Matrix6d turn = attitude_to_odom(T_odom_body);
-  Matrix15d sum = covariance;
-  sum.topLeftCorner<6, 6>() += turn.transpose() * at(T_odom_body.translation) * turn;
-  return sum;
+  return turn.transpose() * at(T_odom_body.translation) * turn;
 }
 
 Matrix6d MapDrift::at(const Eigen::Vector3d& position) const {

@@ -29,12 +29,12 @@ class MapDrift {
   /// `scale`: factor on the variance that a scan leaves behind.
   explicit MapDrift(double scale) : scale_(scale) {}
 
-  /// Begins with what gravity says about the attitude: body axes, [rad^2].
-  void begin(const Eigen::Matrix3d& attitude_covariance_body, const Pose& T_odom_body);
+  /// Begins at the first state: the frame is turned against the level one by what gravity's tilt in it may be.
+  void begin(const FilterState& first);
 
-  /// A scan entered the map at a pose that is known in the map with `covariance` (order of ErrorBlock), which is
+  /// A scan entered the map at a pose that is known in the map with `pose_covariance` (order of ErrorBlock), which is
   /// made of points of the age `age_scans` on average.
-  void add_scan(const Matrix15d& covariance, const Pose& T_odom_body, double age_scans);
+  void add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans);
 
   /// Remembers how well the position was known [m^2, odom axes, published covariance] when the map's scan number
   /// `scan` was placed. Numbers ascend; a smaller one begins a new map.
@@ -49,8 +49,8 @@ class MapDrift {
   /// than it was when they were placed.
   void hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body);
 
-  /// The filter's covariance plus this one, at a pose.
-  [[nodiscard]] Matrix15d add_to(const Matrix15d& covariance, const Pose& T_odom_body) const;
+  /// What a pose is uncertain by beyond its covariance in the map; order of ErrorBlock.
+  [[nodiscard]] Matrix6d pose_covariance(const Pose& T_odom_body) const;
 
  private:
   [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;

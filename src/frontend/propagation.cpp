@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "frontend/lio.h"
-#include "frontend/start_tilt.h"
 
 namespace ignis {
 namespace {
@@ -34,7 +33,6 @@ void Lio::advance_to(Utime utime) {
     FilterState cautious{filter_.nominal, cautious_};
     predict(cautious, input, dt, config_, noise_scale(next));
     cautious_ = cautious.covariance;
-    widen_by_turn(cautious_, filter_.nominal, input, dt, config_.accel_bias_sigma);
     if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
     predict(filter_, input, dt, config_, noise_scale(next));
     now = step_end;
@@ -71,7 +69,7 @@ void Lio::coast_to(Utime utime) {
     sample.utime = imu_.newest() + kCoastingStepUs;
     sample.gyro = live_.angular_rate + live_.gyro_bias;
     sample.accel =
-        live_.T_odom_body.rotation.conjugate() * Eigen::Vector3d(0.0, config_.gravity_m, 0.0) + live_.accel_bias;
+        live_.T_odom_body.rotation.conjugate() * (-config_.gravity_m * live_.gravity_direction()) + live_.accel_bias;
     imu_.add_coasting(sample);
     last_clipped_ = sample.utime;
     live_ = predict_nominal(live_, {sample.gyro, sample.accel}, 1e-6 * kCoastingStepUs, config_.gravity_m);

@@ -18,7 +18,7 @@ constexpr int kMostPasses = 30;
 constexpr double kNoisePerRadius = 0.25;  // sigma of a distance while the pairs are still guesses
 constexpr double kIndependent = 50.0;     // planes that a scan amounts to: neighbouring points repeat one another
 
-double largest_position_sigma(const Matrix15d& covariance) {
+double largest_position_sigma(const ErrorCovariance& covariance) {
   return std::sqrt(covariance.diagonal().segment<3>(kPosition).maxCoeff());
 }
 

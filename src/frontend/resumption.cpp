@@ -25,8 +25,8 @@ void Lio::resume() {
 bool Lio::can_be_resumed() const { return running_ && velocity_known_ && !trust_.awaits_confirmation(); }
 
 bool Lio::is_sound() const {
-  Matrix15d covariance = filter_.covariance;
-  Matrix15d cautious = cautious_;
+  ErrorCovariance covariance = filter_.covariance;
+  ErrorCovariance cautious = cautious_;
   const NavState& state = filter_.nominal;
   return running_ && !imu_.empty() && make_symmetric(covariance) && make_symmetric(cautious) &&
          state.T_odom_body.all_finite() && state.v_odom.allFinite() && state.gyro_bias.allFinite() &&

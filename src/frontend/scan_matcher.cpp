@@ -32,14 +32,14 @@ Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, c
 
 /// A step of its own from where the iterate is; false on numerical failure.
 bool take_step(FilterState& iterate, const PoseInformation& constraints) {
-  const UpdateStep update = information_update(iterate.covariance, Vector15d::Zero(), constraints);
+  const UpdateStep update = information_update(iterate.covariance, ErrorVector::Zero(), constraints);
   if (!update.ok) return false;
   iterate.nominal = perturbed(iterate.nominal, update.step);
   iterate.covariance = update.covariance;
   return true;
 }
 
-double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
+double largest_sigma(const ErrorCovariance& covariance, ErrorBlock block) {
   const Eigen::Matrix3d part = covariance.block<3, 3>(block, block);
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(part, Eigen::EigenvaluesOnly);
   return std::sqrt(std::max(solver.eigenvalues()[2], 0.0));
@@ -202,8 +202,8 @@ PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_c
   return sum;
 }
 
-Matrix15d ScanMatcher::considered() const {
-  Matrix15d blind = Matrix15d::Zero();
+ErrorCovariance ScanMatcher::considered() const {
+  ErrorCovariance blind = ErrorCovariance::Zero();
   blind.topLeftCorner<6, 6>() = degeneracy_.blind_part;
   blind.block<3, 3>(kVelocity, kVelocity) = degeneracy_.blind_part.bottomRightCorner<3, 3>();
   return blind;
@@ -213,7 +213,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
                           const LocalMap& map, MatchResult& result) {
   FilterState& iterate = result.filter;
   Pose associated_at = iterate.nominal.T_odom_body;
-  Matrix15d gate_covariance = predicted.covariance;
+  ErrorCovariance gate_covariance = predicted.covariance;
   if (config_.project_degenerate) result.considered = considered();
   for (int pass = 0; pass < config_.iterations; ++pass) {
     const Vector6d moved = body_difference(associated_at, iterate.nominal.T_odom_body);
@@ -252,7 +252,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
   Matrix6d to_odom = Matrix6d::Identity();
   to_odom.bottomRightCorner<3, 3>() = iterate.nominal.T_odom_body.rotation.toRotationMatrix();
   result.information_body = to_odom.transpose() * used * to_odom;
-  const Vector15d total = difference(predicted.nominal, iterate.nominal);
+  const ErrorVector total = difference(predicted.nominal, iterate.nominal);
   result.stats.correction_m = total.segment<3>(kPosition).norm();
   result.stats.correction_rad = total.segment<3>(kAttitude).norm();
   result.stats.velocity_correction = total.segment<3>(kVelocity).norm();

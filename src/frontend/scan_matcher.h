@@ -31,7 +31,7 @@ struct MatchResult {
   /// What certain points add to that along degenerate directions, after it.
   SalientPart salient;
   /// Projects on what `reliable` must not correct: position along directions that it leaves open, and velocity with it.
-  Matrix15d considered = Matrix15d::Zero();
+  ErrorCovariance considered = ErrorCovariance::Zero();
   DegeneracyAnalysis degeneracy;  ///< which directions that leaves open
   /// Mean age of the map points that the scan met. Times the factor by which the errors of a young map widened the
   /// covariance: all its scans share those, so that what one more of them adds is the part without.
@@ -80,7 +80,7 @@ class ScanMatcher {
   /// Sums the constraints that `counts` says yes to and that lie within the gate.
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance, auto counts) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;
-  [[nodiscard]] Matrix15d considered() const;
+  [[nodiscard]] ErrorCovariance considered() const;
   /// Steps along the degenerate directions: what certain points say there, then what little the rest does. The
   /// information of both; nothing on numerical failure.
   [[nodiscard]] std::optional<Matrix6d> step_along_degenerate(FilterState& iterate, SalientPart& salient);

@@ -15,16 +15,16 @@ PoseInformation PoseInformation::projected(const Matrix6d& projector) const {
   return result;
 }
 
-UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
-                              const PoseInformation& constraints, const Matrix15d& considered) {
+UpdateStep information_update(const ErrorCovariance& prior_covariance, const ErrorVector& deviation,
+                              const PoseInformation& constraints, const ErrorCovariance& considered) {
   // The prior's error in coordinates of the iterate's tangent space: only attitude is curved.
-  Matrix15d to_iterate = Matrix15d::Identity();
+  ErrorCovariance to_iterate = ErrorCovariance::Identity();
   to_iterate.block<3, 3>(kAttitude, kAttitude) = so3::right_jacobian(deviation.segment<3>(kAttitude));
-  const Matrix15d P = to_iterate * prior_covariance * to_iterate.transpose();
-  const Vector15d d = to_iterate * deviation;
+  const ErrorCovariance P = to_iterate * prior_covariance * to_iterate.transpose();
+  const ErrorVector d = to_iterate * deviation;
 
   const Matrix6d& A = constraints.information;
-  const Eigen::Matrix<double, 15, 6> P6 = P.leftCols<6>();
+  const Eigen::Matrix<double, kErrorSize, 6> P6 = P.leftCols<6>();
   const Matrix6d damped = Matrix6d::Identity() + A * P.topLeftCorner<6, 6>();
   Matrix6d M = damped.partialPivLu().solve(A);
   M = (0.5 * (M + M.transpose())).eval();
@@ -32,8 +32,8 @@ UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d
   UpdateStep update;
   update.covariance = P - P6 * M * P6.transpose();
   update.ok = make_symmetric(update.covariance);
-  const Vector15d restored = d - P6 * (M * d.head<6>());
-  const Vector15d full_step = -(update.covariance.leftCols<6>() * constraints.gradient) - restored;
+  const ErrorVector restored = d - P6 * (M * d.head<6>());
+  const ErrorVector full_step = -(update.covariance.leftCols<6>() * constraints.gradient) - restored;
   // The gain K becomes (I - C) K; Joseph's form of the covariance for it is P - G + C G C^T with G = P6 M P6^T.
   update.step = full_step - considered * full_step;
   update.covariance += considered * (P - update.covariance) * considered.transpose();

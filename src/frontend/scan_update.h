@@ -24,9 +24,9 @@ struct PoseInformation {
 
 /// One Gauss-Newton step of the iterated error-state update.
 struct UpdateStep {
-  Vector15d step = Vector15d::Zero();            ///< error that moves the iterate
-  Matrix15d covariance = Matrix15d::Identity();  ///< posterior, in the tangent space of the iterate
-  bool ok = false;                               ///< false: the result is not finite or not positive
+  ErrorVector step = ErrorVector::Zero();                    ///< error that moves the iterate
+  ErrorCovariance covariance = ErrorCovariance::Identity();  ///< posterior, in the tangent space of the iterate
+  bool ok = false;                                           ///< false: the result is not finite or not positive
 };
 
 /// Minimises |x - prior|^2 in the prior's covariance plus the constraints, linearised at the iterate, where
@@ -39,9 +39,9 @@ struct UpdateStep {
 /// `considered` projects on the part of the error that the constraints must not correct although it is correlated with
 /// what they observe; its uncertainty stays, and so does what the rest owes to it (S. F. Schmidt, "Application of
 /// state-space methods to navigation problems", Advances in Control Systems 3, 1966).
-[[nodiscard]] UpdateStep information_update(const Matrix15d& prior_covariance, const Vector15d& deviation,
+[[nodiscard]] UpdateStep information_update(const ErrorCovariance& prior_covariance, const ErrorVector& deviation,
                                             const PoseInformation& constraints,
-                                            const Matrix15d& considered = Matrix15d::Zero());
+                                            const ErrorCovariance& considered = ErrorCovariance::Zero());
 
 /// How far a scan lies from the prediction.
 struct Innovation {

@@ -49,7 +49,7 @@ Quiet summarise(std::span<const ImuSample> window) {
   return quiet;
 }
 
-double largest_sigma(const Matrix15d& covariance, ErrorBlock block) {
+double largest_sigma(const ErrorCovariance& covariance, ErrorBlock block) {
   return std::sqrt(covariance.diagonal().segment<3>(block).maxCoeff());
 }
 
@@ -67,11 +67,12 @@ Standstill measure(std::span<const ImuSample> before, std::span<const ImuSample>
   rate -= state.gyro_bias;
   const Eigen::Matrix3d R = state.T_odom_body.rotation.toRotationMatrix();
   Standstill standstill;
-  standstill.estimate.head<3>() = state.v_odom - delay * (R * force - Eigen::Vector3d(0.0, config.gravity_m, 0.0));
+  standstill.estimate.head<3>() = state.v_odom - delay * (R * force + config.gravity_m * state.gravity_direction());
   standstill.estimate.tail<3>() = rate;
   standstill.derivative.block<3, 3>(0, kAttitude) = delay * R * so3::skew(force);
   standstill.derivative.block<3, 3>(0, kVelocity).setIdentity();
   standstill.derivative.block<3, 3>(0, kAccelBias) = delay * R;
+  standstill.derivative.block<3, 2>(0, kGravityTilt) = -delay * config.gravity_m * gravity_direction_by_tilt(state);
   standstill.derivative.block<3, 3>(3, kGyroBias) = -Eigen::Matrix3d::Identity();
   const double interval = 0.5e-6 * static_cast<double>(kStandstillWindowUs);
   standstill.variance.head<3>().setConstant(config.zero_velocity_sigma * config.zero_velocity_sigma +
@@ -89,10 +90,11 @@ bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, con
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   for (const ImuSample& sample : std::span(begin, end)) force += sample.accel / static_cast<double>(end - begin);
   const Eigen::Vector3d acceleration =
-      state.T_odom_body.rotation * (force - state.accel_bias) - Eigen::Vector3d(0.0, config.gravity_m, 0.0);
+      state.T_odom_body.rotation * (force - state.accel_bias) + config.gravity_m * state.gravity_direction();
   const double seconds = seconds_between(begin->utime, std::prev(end)->utime);
   const double noise = config.imu_noise_accel / std::sqrt(seconds);
-  const double sigma = std::hypot(noise, largest_sigma(filter.covariance, kAccelBias));
+  const double sigma =
+      std::hypot(noise, std::sqrt(rest_acceleration_covariance(filter, config.gravity_m).diagonal().maxCoeff()));
   return acceleration.norm() > kSigmas * sigma;
 }
 
@@ -128,12 +130,12 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
 }
 
 void correct_to_standstill(FilterState& filter, const Standstill& standstill) {
-  const Matrix15d& P = filter.covariance;
-  const Eigen::Matrix<double, 6, 15>& H = standstill.derivative;
+  const ErrorCovariance& P = filter.covariance;
+  const Eigen::Matrix<double, 6, kErrorSize>& H = standstill.derivative;
   const Matrix6d R = standstill.variance.asDiagonal();
-  const Eigen::Matrix<double, 15, 6> K = P * H.transpose() * (H * P * H.transpose() + R).inverse();
-  const Matrix15d kept = Matrix15d::Identity() - K * H;
-  const Vector15d step = -K * standstill.estimate;
+  const Eigen::Matrix<double, kErrorSize, 6> K = P * H.transpose() * (H * P * H.transpose() + R).inverse();
+  const ErrorCovariance kept = ErrorCovariance::Identity() - K * H;
+  const ErrorVector step = -K * standstill.estimate;
   filter.covariance = kept * P * kept.transpose() + K * R * K.transpose();
   filter.covariance = (0.5 * (filter.covariance + filter.covariance.transpose())).eval();
   filter.nominal = perturbed(filter.nominal, step);

@@ -17,8 +17,9 @@ inline constexpr Utime kStandstillWindowUs = kMicrosPerSecond / 2;
 /// velocity (odom axes) [m/s], turn rate (body axes) [rad/s].
 struct Standstill {
   Vector6d estimate = Vector6d::Zero();  ///< of both; what differs from zero is error
-  Eigen::Matrix<double, 6, 15> derivative = Eigen::Matrix<double, 6, 15>::Zero();  ///< by the error of the state
-  Vector6d variance = Vector6d::Zero();  ///< of IMU noise and of `zero_velocity_sigma`
+  Eigen::Matrix<double, 6, kErrorSize> derivative =
+      Eigen::Matrix<double, 6, kErrorSize>::Zero();  ///< by the error of the state
+  Vector6d variance = Vector6d::Zero();              ///< of IMU noise and of `zero_velocity_sigma`
 };
 
 /// Something when the vehicle stood during the half second before `filter.nominal.utime`: IMU quiet within the

@@ -31,7 +31,7 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   const ScanStats& stats = evidence.stats;
   note_arrival(stats.utime);
   position_sigma_ = evidence.position_sigma;
-  accel_bias_sigma_ = evidence.accel_bias_sigma;
+  acceleration_sigma_ = evidence.acceleration_sigma;
   last_reason_ = text(stats.reason);
   if (!last_applied_) last_applied_ = stats.utime;
   corrections_.push_back({stats.utime, evidence.velocity_correction});
@@ -87,7 +87,7 @@ double TrustMonitor::disagreement() const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Correction& correction : corrections_) sum += correction.velocity;
   // A tilt error acts like a bias; its prior bounds what either can do.
-  const double bias = std::max(accel_bias_sigma_, 0.5 * config_.accel_bias_sigma) * seconds;
+  const double bias = std::max(acceleration_sigma_, 0.5 * config_.accel_bias_sigma) * seconds;
   const double white = config_.imu_noise_accel * std::sqrt(seconds);
   return sum.norm() / std::hypot(bias, white);
 }

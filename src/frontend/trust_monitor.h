@@ -23,7 +23,7 @@ struct ScanEvidence {
   ScanStats stats;
   double position_sigma = 0.0;                                    ///< [m] largest of the position in the map
   Eigen::Vector3d velocity_correction = Eigen::Vector3d::Zero();  ///< [m/s] odom axes, zero when not applied
-  double accel_bias_sigma = 0.0;                                  ///< [m/s^2] largest axis
+  double acceleration_sigma = 0.0;  ///< [m/s^2] of the acceleration that the IMU is believed to feel, largest axis
 };
 
 /// Judges from scans and stamps alone whether the pose may be trusted, and says why not.
@@ -77,7 +77,7 @@ class TrustMonitor {
   bool uncertain_start_ = false;
   int losses_ = 0;
   double position_sigma_ = 0.0;
-  double accel_bias_sigma_ = 0.0;
+  double acceleration_sigma_ = 0.0;
   std::deque<Correction> corrections_;
 
   friend void transfer(auto& io, FieldsOf<Correction> auto& correction) {
@@ -96,7 +96,7 @@ class TrustMonitor {
     io.number(monitor.uncertain_start_);
     io.number(monitor.losses_);
     io.number(monitor.position_sigma_);
-    io.number(monitor.accel_bias_sigma_);
+    io.number(monitor.acceleration_sigma_);
     io.list(monitor.corrections_);
   }
 };

@@ -28,6 +28,7 @@ NavState random_state(std::mt19937& random) {
   state.v_odom = random_vector(random, 3.0);
   state.gyro_bias = random_vector(random, 0.05);
   state.accel_bias = random_vector(random, 0.3);
+  state.gravity_tilt = random_vector(random, 0.2).head<2>();
   return state;
 }
 
@@ -41,14 +42,14 @@ TEST(Eskf, TransitionEqualsNumericalDerivative) {
       const NavState state = random_state(random);
       const InertialInput input = random_input(random);
       const NavState next = predict_nominal(state, input, dt, kGravity);
-      Matrix15d numerical;
-      for (int i = 0; i < 15; ++i) {
-        const Vector15d e = kStep * Vector15d::Unit(i);
-        const Vector15d plus = difference(next, predict_nominal(perturbed(state, e), input, dt, kGravity));
-        const Vector15d minus = difference(next, predict_nominal(perturbed(state, -e), input, dt, kGravity));
+      ErrorCovariance numerical;
+      for (int i = 0; i < kErrorSize; ++i) {
+        const ErrorVector e = kStep * ErrorVector::Unit(i);
+        const ErrorVector plus = difference(next, predict_nominal(perturbed(state, e), input, dt, kGravity));
+        const ErrorVector minus = difference(next, predict_nominal(perturbed(state, -e), input, dt, kGravity));
         numerical.col(i) = (plus - minus) / (2.0 * kStep);
       }
-      EXPECT_LT((transition(state, input, dt) - numerical).cwiseAbs().maxCoeff(), 1e-7);
+      EXPECT_LT((transition(state, input, dt, kGravity) - numerical).cwiseAbs().maxCoeff(), 1e-7);
     }
   }
 }
@@ -57,8 +58,9 @@ TEST(Eskf, DifferenceInvertsPerturbation) {
   std::mt19937 random(2);
   for (int trial = 0; trial < 20; ++trial) {
     const NavState state = random_state(random);
-    Vector15d error;
+    ErrorVector error;
     for (int i = 0; i < 5; ++i) error.segment<3>(3 * i) = random_vector(random, 1.0);
+    error.segment<2>(kGravityTilt) = random_vector(random, 0.2).head<2>();
     EXPECT_LT((difference(state, perturbed(state, error)) - error).norm(), 1e-12);
   }
 }
@@ -109,7 +111,7 @@ TEST(Eskf, CovarianceMatchesSampledErrors) {
   constexpr int kRuns = 3000;
   const InertialInput nominal{{0.1, 0.4, -0.2}, {0.5, 9.5, -1.0}};
   FilterState filter;
-  filter.covariance = 1e-20 * Matrix15d::Identity();
+  filter.covariance = 1e-20 * ErrorCovariance::Identity();
   for (int i = 0; i < kSteps; ++i) predict(filter, nominal, kDt, config);
 
   std::mt19937 random(4);
@@ -135,16 +137,16 @@ TEST(Eskf, CovarianceStaysSymmetricPositiveDefinite) {
   std::mt19937 random(5);
   const FrontendConfig config;
   FilterState filter;
-  filter.covariance = 1e-6 * Matrix15d::Identity();
+  filter.covariance = 1e-6 * ErrorCovariance::Identity();
   for (int i = 0; i < 5000; ++i) predict(filter, random_input(random), 0.004, config);
   EXPECT_EQ((filter.covariance - filter.covariance.transpose()).cwiseAbs().maxCoeff(), 0.0);
-  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix15d>(filter.covariance).eigenvalues()[0], 0.0);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<ErrorCovariance>(filter.covariance).eigenvalues()[0], 0.0);
 }
 
 TEST(Eskf, GapMultipliesWhiteNoise) {
   const FrontendConfig config;
   FilterState healthy;
-  healthy.covariance = 1e-12 * Matrix15d::Identity();
+  healthy.covariance = 1e-12 * ErrorCovariance::Identity();
   FilterState gap = healthy;
   predict(healthy, {}, 0.1, config);
   predict(gap, {}, 0.1, config, 25.0);

@@ -21,7 +21,7 @@ class Driver {
   explicit Driver(double yaw = 0.0) : interval(config) {
     filter.nominal.T_odom_body.rotation = frames::from_yaw_pitch_roll({yaw, 0.0, 0.0});
     filter.nominal.v_odom = filter.nominal.T_odom_body.rotation * Eigen::Vector3d(0.0, 0.0, -1.0);
-    filter.covariance = 1e-8 * Matrix15d::Identity();
+    filter.covariance = 1e-8 * ErrorCovariance::Identity();
     filter.covariance.block<3, 3>(kVelocity, kVelocity) = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
     interval.begin(filter);
   }

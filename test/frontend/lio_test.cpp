@@ -90,18 +90,23 @@ TEST(Lio, CovarianceOfVelocityIsHonest) {
   EXPECT_LT(nees, 4.0);
 }
 
-TEST(Lio, ATurnWidensThePublishedAccelerometerBias) {
-  FrontendConfig config;
-  config.use_scan_matching = false;
-  config.zero_velocity_sigma = 0.0;
-  const auto variance_at_end = [&](const test::Trajectory& truth) {
-    const LioRun run = run_lio(config, test::simulate(test::furnished_hall(), truth, 20.0, Sensors{}, 1));
-    return run.scans.back().covariance(kAccelBias, kAccelBias);
+TEST(Lio, ATurnTellsTheTiltOfTheStartFromAnAccelerometerBias) {
+  const FrontendConfig config;
+  const LioRun straight =
+      run_lio(config, test::simulate(test::furnished_hall(), test::straight_drive(2.0, 1.0), 8.0, Sensors{}, 1));
+  const LioRun turning = run_lio(config, hall_drive());
+  const auto sigma_of_bias = [](const LioRun& run) {
+    return std::sqrt(run.scans.back().covariance(kAccelBias, kAccelBias));
   };
-  const double straight = variance_at_end(test::straight_drive(2.0, 1.0));
-  const double turning = variance_at_end(test::ellipse_drive(2.0, 2.0, 2.0, 1.0));
-  // Eighteen seconds at half a radian a second, of which 0.1 counts as noise.
-  EXPECT_GT(turning - straight, 0.5 * config.accel_bias_sigma * config.accel_bias_sigma * 18.0 * 0.4);
+  EXPECT_GT(sigma_of_bias(straight), 0.9 * config.accel_bias_sigma) << "nothing tells them apart";
+  EXPECT_LT(sigma_of_bias(turning), 0.3 * config.accel_bias_sigma);
+
+  const NavState& end = turning.scans.back().state;
+  EXPECT_LT((end.accel_bias - Sensors{}.accel_bias).norm(), 3.0 * sigma_of_bias(turning));
+  const Eigen::Quaterniond q_true = hall_drive().truth(test::drive_seconds(hall_drive(), end.utime)).rotation;
+  const Eigen::Vector3d down = end.T_odom_body.rotation * (q_true.conjugate() * -Eigen::Vector3d::UnitY());
+  const Eigen::Vector2d error = end.gravity_tilt - Eigen::Vector2d(down.x(), down.z());
+  EXPECT_LT(error.norm(), 3.0 * sigma_of_bias(turning) / config.gravity_m) << "of " << end.gravity_tilt.norm();
 }
 
 TEST(Lio, CorridorLeavesItsAxisToTheImuAndSaysSoAboveTheThreshold) {

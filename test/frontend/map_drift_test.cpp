@@ -15,51 +15,64 @@ namespace {
 
 const Pose kStart{so3::exp({0.1, -0.2, 0.05}), {1.0, 2.0, 3.0}};
 
-Matrix15d published(const MapDrift& drift, const Pose& pose) { return drift.add_to(Matrix15d::Zero(), pose); }
+Matrix6d published(const MapDrift& drift, const Pose& pose) { return drift.pose_covariance(pose); }
+
+/// The first state, with gravity's tilt as uncertain as `sigma` says along x and z.
+FilterState first_state(const Eigen::Vector2d& sigma) {
+  FilterState state;
+  state.nominal.T_odom_body = kStart;
+  state.covariance.setZero();
+  state.covariance.block<2, 2>(kGravityTilt, kGravityTilt) = sigma.cwiseAbs2().asDiagonal();
+  return state;
+}
 
 TEST(MapDrift, AStartThatIsNotLevelTiltsAllThatFollows) {
   MapDrift drift(1.0);
   constexpr double kTilt = 0.01;
-  drift.begin(kTilt * kTilt * Eigen::Matrix3d::Identity(), kStart);
+  drift.begin(first_state({kTilt, kTilt}));
   Pose far = kStart;
   far.translation.z() -= 20.0;
-  const Matrix15d covariance = published(drift, far);
-  EXPECT_NEAR(std::sqrt(covariance(kPosition, kPosition)), 20.0 * kTilt, 1e-9);
+  const Matrix6d covariance = published(drift, far);
+  EXPECT_NEAR(covariance(kPosition, kPosition), 0.0, 1e-12) << "the heading is a definition";
   EXPECT_NEAR(std::sqrt(covariance(kPosition + 1, kPosition + 1)), 20.0 * kTilt, 1e-9);
   EXPECT_NEAR(covariance(kPosition + 2, kPosition + 2), 0.0, 1e-12) << "a turn does not stretch the way";
-  EXPECT_NEAR(std::sqrt(covariance(kAttitude, kAttitude)), kTilt, 1e-9);
+  const Eigen::Matrix3d R = far.rotation.toRotationMatrix();
+  const Eigen::Matrix3d attitude = R * covariance.topLeftCorner<3, 3>() * R.transpose();
+  const Eigen::Matrix3d expected = Eigen::Vector3d(kTilt * kTilt, 0.0, kTilt * kTilt).asDiagonal();
+  EXPECT_LT((attitude - expected).norm(), 1e-12);
 }
 
 TEST(MapDrift, CovarianceMatchesSampledTurnsAndShiftsOfTheMap) {
-  const Eigen::Vector3d sigma(0.01, 0.02, 0.015);
+  const Eigen::Vector2d sigma(0.01, 0.02);
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   const Pose later{so3::exp({0.3, 1.2, -0.1}), {5.0, 1.0, -9.0}};
   Matrix6d sampled = Matrix6d::Zero();
   constexpr int kSamples = 20000;
   for (int i = 0; i < kSamples; ++i) {
+    NavState tilted;
     const double x = normal(random);
-    const double y = normal(random);
     const double z = normal(random);
-    const Eigen::Vector3d turn_body = sigma.cwiseProduct(Eigen::Vector3d(x, y, z));
-    // The first pose is off by a turn, and the whole map with it.
+    tilted.gravity_tilt = sigma.cwiseProduct(Eigen::Vector2d(x, z));
+    // The first pose is off by the turn that makes gravity point down, and the whole map with it.
     Pose wrong = kStart;
-    wrong.rotation = kStart.rotation * so3::exp(turn_body);
+    wrong.rotation =
+        Eigen::Quaterniond::FromTwoVectors(tilted.gravity_direction(), -Eigen::Vector3d::UnitY()) * kStart.rotation;
     const Pose moved = wrong * (kStart.inverse() * later);
     Vector6d error;
     error << so3::log(later.rotation.conjugate() * moved.rotation), moved.translation - later.translation;
     sampled += error * error.transpose() / kSamples;
   }
   MapDrift drift(1.0);
-  drift.begin(sigma.cwiseAbs2().asDiagonal(), kStart);
-  const Matrix6d expected = published(drift, later).topLeftCorner<6, 6>();
+  drift.begin(first_state(sigma));
+  const Matrix6d expected = published(drift, later);
   EXPECT_LT((sampled - expected).norm(), 0.05 * expected.norm());
 }
 
 TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
   MapDrift drift(2.0);
-  drift.begin(Eigen::Matrix3d::Zero(), kStart);
-  Matrix15d covariance = 1e-6 * Matrix15d::Identity();
+  drift.begin(first_state(Eigen::Vector2d::Zero()));
+  Matrix6d covariance = 1e-6 * Matrix6d::Identity();
   covariance(kPosition + 2, kPosition + 2) = 1e-2;  // not observed
   drift.add_scan(covariance, kStart, 10.0);
   EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 / 10.0, 1e-12);
@@ -72,7 +85,7 @@ TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
 /// Published variance along Z of a drive that was known to 1 cm at scan 10, 1 m at scan 110 and 2 m at scan 210.
 struct Drifted : ::testing::Test {
   Drifted() {
-    drift.begin(Eigen::Matrix3d::Zero(), kStart);
+    drift.begin(first_state(Eigen::Vector2d::Zero()));
     drift.remember(10, 1e-4 * Eigen::Matrix3d::Identity());
     drift.remember(110, Eigen::Matrix3d::Identity());
     drift.remember(210, 4.0 * Eigen::Matrix3d::Identity());
@@ -126,7 +139,7 @@ TEST_F(Drifted, ANewMapForgetsThePlacesOfTheOld) {
 
 TEST(MapDrift, RemembersTheLastMinutesOnly) {
   MapDrift drift(1.0);
-  drift.begin(Eigen::Matrix3d::Zero(), kStart);
+  drift.begin(first_state(Eigen::Vector2d::Zero()));
   for (int scan = 0; scan < 20'000; ++scan) drift.remember(scan, scan * Eigen::Matrix3d::Identity());
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);

@@ -14,7 +14,7 @@ namespace {
 
 class ScanMatcherTest : public ::testing::Test {
  protected:
-  ScanMatcherTest() { predicted_.covariance = 1e-4 * Matrix15d::Identity(); }
+  ScanMatcherTest() { predicted_.covariance = 1e-4 * ErrorCovariance::Identity(); }
 
   [[nodiscard]] MatchResult match() const {
     return ScanMatcher(config_).match(predicted_, predicted_.nominal.T_odom_body, standing_.newest, standing_.map);
@@ -61,7 +61,7 @@ class CorridorEnd : public ::testing::Test {
       }
     }
     config_.degeneracy_signal_to_noise = 8.0;
-    predicted_.covariance = 1e-4 * Matrix15d::Identity();
+    predicted_.covariance = 1e-4 * ErrorCovariance::Identity();
     predicted_.nominal.T_odom_body.translation.z() = 0.02;
   }
 

@@ -22,25 +22,25 @@ struct ScalarConstraint {
 };
 
 /// The reference's update: one point at a time with a scalar Kalman gain, all linearised at the prior.
-UpdateStep update_points(const Matrix15d& prior, const std::vector<ScalarConstraint>& constraints) {
+UpdateStep update_points(const ErrorCovariance& prior, const std::vector<ScalarConstraint>& constraints) {
   UpdateStep result;
   result.covariance = prior;
   for (const ScalarConstraint& constraint : constraints) {
-    Vector15d H = Vector15d::Zero();
+    ErrorVector H = ErrorVector::Zero();
     H.head<6>() = constraint.h;
-    const Vector15d PH = result.covariance * H;
+    const ErrorVector PH = result.covariance * H;
     const double S = H.dot(PH) + constraint.variance;
-    const Vector15d K = PH / S;
+    const ErrorVector K = PH / S;
     result.step -= K * (constraint.z + H.dot(result.step));
-    result.covariance = (Matrix15d::Identity() - K * H.transpose()) * result.covariance;
+    result.covariance = (ErrorCovariance::Identity() - K * H.transpose()) * result.covariance;
   }
   return result;
 }
 
-Matrix15d random_covariance(std::mt19937& random) {
+ErrorCovariance random_covariance(std::mt19937& random) {
   std::normal_distribution<double> normal;
-  const Matrix15d A = Matrix15d::NullaryExpr([&] { return 0.05 * normal(random); });
-  return A * A.transpose() + 1e-6 * Matrix15d::Identity();
+  const ErrorCovariance A = ErrorCovariance::NullaryExpr([&] { return 0.05 * normal(random); });
+  return A * A.transpose() + 1e-6 * ErrorCovariance::Identity();
 }
 
 std::vector<ScalarConstraint> random_constraints(std::mt19937& random, int count) {
@@ -62,10 +62,10 @@ PoseInformation summed(const std::vector<ScalarConstraint>& constraints) {
 TEST(ScanUpdate, InformationFormEqualsScalarUpdates) {
   std::mt19937 random(1);
   for (int trial = 0; trial < 20; ++trial) {
-    const Matrix15d prior = random_covariance(random);
+    const ErrorCovariance prior = random_covariance(random);
     const std::vector<ScalarConstraint> constraints = random_constraints(random, 1 + 20 * trial);
     const UpdateStep scalar = update_points(prior, constraints);
-    const UpdateStep information = information_update(prior, Vector15d::Zero(), summed(constraints));
+    const UpdateStep information = information_update(prior, ErrorVector::Zero(), summed(constraints));
     ASSERT_TRUE(information.ok);
     EXPECT_LT((scalar.step - information.step).cwiseAbs().maxCoeff(), 1e-9);
     EXPECT_LT((scalar.covariance - information.covariance).cwiseAbs().maxCoeff(), 1e-9);
@@ -75,15 +75,15 @@ TEST(ScanUpdate, InformationFormEqualsScalarUpdates) {
 TEST(ScanUpdate, LaterPassIsTheMinimumOfPriorPlusConstraints) {
   // Normal equations with an explicit inverse of the prior, at an iterate away from it.
   std::mt19937 random(2);
-  const Matrix15d prior = random_covariance(random);
+  const ErrorCovariance prior = random_covariance(random);
   const PoseInformation sum = summed(random_constraints(random, 50));
-  Vector15d deviation = Vector15d::LinSpaced(-0.05, 0.08);
+  ErrorVector deviation = ErrorVector::LinSpaced(-0.05, 0.08);
   const UpdateStep update = information_update(prior, deviation, sum);
 
-  Matrix15d J = Matrix15d::Identity();
+  ErrorCovariance J = ErrorCovariance::Identity();
   J.block<3, 3>(kAttitude, kAttitude) = so3::right_jacobian_inverse(deviation.segment<3>(kAttitude));
-  Matrix15d normal = J.transpose() * prior.inverse() * J;
-  Vector15d gradient = J.transpose() * prior.inverse() * deviation;
+  ErrorCovariance normal = J.transpose() * prior.inverse() * J;
+  ErrorVector gradient = J.transpose() * prior.inverse() * deviation;
   normal.topLeftCorner<6, 6>() += sum.information;
   gradient.head<6>() += sum.gradient;
   EXPECT_LT((update.step + normal.inverse() * gradient).norm(), 1e-8);
@@ -92,8 +92,8 @@ TEST(ScanUpdate, LaterPassIsTheMinimumOfPriorPlusConstraints) {
 
 TEST(ScanUpdate, WithoutConstraintsReturnsToThePrior) {
   std::mt19937 random(3);
-  const Matrix15d prior = random_covariance(random);
-  const UpdateStep update = information_update(prior, Vector15d::Zero(), {});
+  const ErrorCovariance prior = random_covariance(random);
+  const UpdateStep update = information_update(prior, ErrorVector::Zero(), {});
   EXPECT_EQ(update.step.norm(), 0.0);
   EXPECT_LT((update.covariance - prior).cwiseAbs().maxCoeff(), 1e-15);
 }
@@ -101,7 +101,7 @@ TEST(ScanUpdate, WithoutConstraintsReturnsToThePrior) {
 TEST(ScanUpdate, ReportsValuesThatAreNotFinite) {
   PoseInformation sum;
   sum.add(Vector6d::Constant(std::nan("")), 0.0, 0.01);
-  EXPECT_FALSE(information_update(Matrix15d::Identity(), Vector15d::Zero(), sum).ok);
+  EXPECT_FALSE(information_update(ErrorCovariance::Identity(), ErrorVector::Zero(), sum).ok);
 }
 
 TEST(NormalisedInnovation, OfOneConstraintIsTheScalarOne) {
@@ -168,8 +168,8 @@ TEST(Degeneracy, ProjectedInformationLeavesThePriorAloneThere) {
   for (int i = 0; i < 6; ++i) sum.add(Vector6d::Unit(i), 0.1, 0.01);
   Matrix6d projector = Matrix6d::Identity();
   projector(4, 4) = 0.0;
-  const Matrix15d prior = 0.04 * Matrix15d::Identity();
-  const UpdateStep update = information_update(prior, Vector15d::Zero(), sum.projected(projector));
+  const ErrorCovariance prior = 0.04 * ErrorCovariance::Identity();
+  const UpdateStep update = information_update(prior, ErrorVector::Zero(), sum.projected(projector));
   EXPECT_DOUBLE_EQ(update.step[4], 0.0);
   EXPECT_DOUBLE_EQ(update.covariance(4, 4), 0.04);
   EXPECT_NEAR(update.step[3], -0.08, 1e-12);
@@ -177,17 +177,17 @@ TEST(Degeneracy, ProjectedInformationLeavesThePriorAloneThere) {
 
 TEST(ScanUpdate, ConsideredPartKeepsItsPlaceAndTheCovarianceIsThatOfTheGainWithoutIt) {
   std::mt19937 random(6);
-  const Matrix15d P = random_covariance(random);
+  const ErrorCovariance P = random_covariance(random);
   const std::vector<ScalarConstraint> constraints = random_constraints(random, 30);
-  Matrix15d considered = Matrix15d::Zero();
+  ErrorCovariance considered = ErrorCovariance::Zero();
   const Eigen::Vector3d along = Eigen::Vector3d(0.3, -0.2, 0.9).normalized();
   considered.block<3, 3>(kPosition, kPosition) = along * along.transpose();
   considered.block<3, 3>(kVelocity, kVelocity) = along * along.transpose();
-  const UpdateStep update = information_update(P, Vector15d::Zero(), summed(constraints), considered);
+  const UpdateStep update = information_update(P, ErrorVector::Zero(), summed(constraints), considered);
 
   // All constraints at once with an explicit gain, and Joseph's form, which holds for any gain.
   const auto count = static_cast<Eigen::Index>(constraints.size());
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(count, 15);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(count, kErrorSize);
   Eigen::MatrixXd R = Eigen::MatrixXd::Zero(count, count);
   Eigen::VectorXd z(count);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -197,9 +197,9 @@ TEST(ScanUpdate, ConsideredPartKeepsItsPlaceAndTheCovarianceIsThatOfTheGainWitho
     z[i] = constraint.z;
   }
   const Eigen::MatrixXd gain =
-      (Matrix15d::Identity() - considered) * P * H.transpose() * (H * P * H.transpose() + R).inverse();
-  const Matrix15d kept = Matrix15d::Identity() - gain * H;
-  const Matrix15d expected = kept * P * kept.transpose() + gain * R * gain.transpose();
+      (ErrorCovariance::Identity() - considered) * P * H.transpose() * (H * P * H.transpose() + R).inverse();
+  const ErrorCovariance kept = ErrorCovariance::Identity() - gain * H;
+  const ErrorCovariance expected = kept * P * kept.transpose() + gain * R * gain.transpose();
   ASSERT_TRUE(update.ok);
   EXPECT_LT((update.covariance - expected).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LT((update.step + gain * z).norm(), 1e-9);

@@ -80,7 +80,7 @@ FilterState correlated_state() {
   FilterState filter = resting_state();
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
-  Matrix15d root;
+  ErrorCovariance root;
   for (double& value : root.reshaped()) value = 0.01 * normal(random);
   filter.covariance += root * root.transpose();
   filter.nominal.v_odom = {0.03, -0.02, 0.01};
@@ -96,7 +96,7 @@ TEST(Standstill, DerivativeOfTheEarlierVelocityIsTheNumericalOne) {
   for (int i = 0; i < 15; ++i) {
     constexpr double kStep = 1e-6;
     FilterState moved = filter;
-    moved.nominal = perturbed(filter.nominal, kStep * Vector15d::Unit(i));
+    moved.nominal = perturbed(filter.nominal, kStep * ErrorVector::Unit(i));
     const auto there = find_standstill(samples, moved, FrontendConfig{});
     ASSERT_TRUE(there);
     EXPECT_LT(((there->estimate - at->estimate) / kStep - at->derivative.col(i)).norm(), 1e-4) << i;
@@ -105,15 +105,15 @@ TEST(Standstill, DerivativeOfTheEarlierVelocityIsTheNumericalOne) {
 
 TEST(Standstill, CorrectionEqualsAKalmanUpdateWrittenOut) {
   FilterState filter = correlated_state();
-  const Matrix15d P = filter.covariance;
+  const ErrorCovariance P = filter.covariance;
   const auto standstill = find_standstill(quiet_samples(4), filter, FrontendConfig{});
   ASSERT_TRUE(standstill);
 
   // Independent form: information matrices added.
   const auto& H = standstill->derivative;
   const Matrix6d W = standstill->variance.cwiseInverse().asDiagonal();
-  const Matrix15d expected = (P.inverse() + H.transpose() * W * H).inverse();
-  const Vector15d step = -expected * H.transpose() * W * standstill->estimate;
+  const ErrorCovariance expected = (P.inverse() + H.transpose() * W * H).inverse();
+  const ErrorVector step = -expected * H.transpose() * W * standstill->estimate;
   const NavState moved = perturbed(filter.nominal, step);
 
   correct_to_standstill(filter, *standstill);

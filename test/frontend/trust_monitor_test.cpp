@@ -16,7 +16,7 @@ class Feed {
   Feed() {
     evidence.stats.reason = ScanReason::kApplied;
     evidence.position_sigma = 0.01;
-    evidence.accel_bias_sigma = 0.05;
+    evidence.acceleration_sigma = 0.05;
     run(20);
   }
 

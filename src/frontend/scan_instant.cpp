@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/scan_instant.h"
+
+#include <algorithm>
+
+namespace ignis {
+
+double mean_age(const Scan& scan) {
+  if (scan.points.empty()) return 0.0;
+  double sum = 0.0;
+  for (const ScanPoint& point : scan.points) sum += 1e-6 * (scan.duration_us - point.dt_us);
+  return sum / static_cast<double>(scan.points.size());
+}
+
+double velocity_variance(const ErrorCovariance& covariance) {
+  return covariance.diagonal().segment<3>(kVelocity).sum();
+}
+
+double new_share(const ErrorCovariance& covariance, double mapped_velocity_variance) {
+  return std::clamp(1.0 - mapped_velocity_variance / velocity_variance(covariance), 0.0, 1.0);
+}
+
+ErrorCovariance with_position_at(const ErrorCovariance& covariance, double seconds) {
+  ErrorCovariance moved = covariance;
+  moved.middleRows<3>(kPosition) += seconds * moved.middleRows<3>(kVelocity);
+  moved.middleCols<3>(kPosition) += seconds * moved.middleCols<3>(kVelocity);
+  return moved;
+}
+
+}  // namespace ignis
