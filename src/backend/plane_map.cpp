@@ -44,7 +44,6 @@ std::vector<CloudPoint> one_per_voxel(std::span<const CloudPoint> cloud, double 
     const Eigen::Vector3d position = point.position.cast<double>();
     if (taken.insert(key_of(cell_of<double>(position / voxel_m))).second) kept.push_back(point);
   }
-  kept.shrink_to_fit();  // it is kept for good, and grew by doubling
   return kept;
 }
 

@@ -135,7 +135,6 @@ TEST(PlaneMap, KeepsOnePointPerVoxelOnBothSidesOfZero) {
       point_at(-0.09, 0, 0), point_at(0.11, 0, 0), point_at(std::numeric_limits<double>::quiet_NaN(), 0, 0)};
   const auto kept = one_per_voxel(cloud, 0.1);
   ASSERT_EQ(kept.size(), 3U);
-  EXPECT_EQ(kept.capacity(), kept.size()) << "clouds are kept for good";
   EXPECT_EQ(kept[0].position.x(), 0.01F);
   EXPECT_EQ(kept[1].position.x(), -0.01F);
   EXPECT_EQ(kept[2].position.x(), 0.11F);
