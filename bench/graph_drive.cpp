@@ -7,7 +7,6 @@
 //     build/release/bin/graph_drive KEYFRAMES.lcm --config config/ignis8_tuned.json --set backend.SECTION.KEY=VALUE
 
 #include <algorithm>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -18,39 +17,16 @@
 
 #include "backend/smoother.h"
 #include "common/trajectory_file.h"
-#include "messages/keyframe_messages.h"
-#include "messages/lcm_log.h"
-#include "messages/length_check.h"
+#include "keyframe_file.h"
+#include "odometry_source.h"
+#include "process_cost.h"
 #include "runtime/application.h"
-#include "runtime/channels.h"
 
 namespace {
 
 using namespace ignis;
-
-double processor_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
-std::vector<Keyframe> read_keyframes(const std::filesystem::path& file) {
-  messages::LcmLog log(file);
-  messages::KeyframeAssembler assembler;
-  std::vector<Keyframe> keyframes;
-  while (const auto event = log.next()) {
-    keyframe_t part;
-    if (event->channel != runtime::channels::kKeyframe || !messages::decode_checked(event->data, part)) continue;
-    if (auto keyframe = assembler.add(part)) keyframes.push_back(std::move(*keyframe));
-  }
-  return keyframes;
-}
+using bench::processor_ms;
+using bench::quantile;
 
 /// The back end over one session's keyframes.
 class Drive {
@@ -79,6 +55,7 @@ class Drive {
             {"loops", stats.loops_kept},
             {"waiting", stats.loops_waiting},
             {"withdrawn", stats.loops_withdrawn},
+            {"kB_per_keyframe", (bench::resident_bytes() - bytes_before_) / 1e3 / std::max(1, stats.keyframes)},
             {"cpu_s", sum / 1e3},
             {"cpu_ms_per_drive_s", sum / std::max(seconds, 1e-9)},
             {"p50_ms", quantile(times_ms_, 0.5)},
@@ -128,6 +105,7 @@ class Drive {
     }
   }
 
+  double bytes_before_ = bench::resident_bytes();
   Smoother smoother_;
   std::vector<double> times_ms_;
   Trajectory odometry_;
@@ -141,15 +119,19 @@ class Drive {
 int main(int argc, char** argv) {
   std::string log;
   std::string folder;
+  std::string odometry = "scans";
   return runtime::run_application(
       "graph_drive", "Runs the back end over recorded keyframes.", argc, argv,
       [&](CLI::App& app) {
         app.add_option("log", log, "LCM log with LIO_KEYFRAME")->required();
         app.add_option("-o,--out", folder, "folder for trajectories, loops and graph");
+        app.add_option("--odometry", odometry, "what links two keyframes besides the IMU: scans, filter or nothing")
+            ->check(CLI::IsMember({"scans", "filter", "nothing"}));
       },
       [&](const runtime::Application& application) {
-        const std::vector<Keyframe> keyframes = read_keyframes(log);
-        if (keyframes.empty()) throw runtime::UserError(log + " holds no keyframe");
+        std::vector<Keyframe> keyframes = bench::read_keyframes(log);
+        if (odometry == "filter") bench::link_by_filter(keyframes);
+        if (odometry == "nothing") bench::link_by_nothing(keyframes);
         auto drive = std::make_unique<Drive>(application.config);
         std::int32_t session = keyframes.front().session;
         for (const Keyframe& keyframe : keyframes) {

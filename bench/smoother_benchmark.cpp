@@ -7,40 +7,22 @@
 //     ninja -C build/release benchmarks && build/release/bin/smoother_benchmark
 
 #include <benchmark/benchmark.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <ctime>
-#include <fstream>
 #include <vector>
 
 #include "backend/smoother.h"
 #include "backend/synthetic_drive.h"
+#include "process_cost.h"
 
 namespace ignis {
 namespace {
 
+using bench::processor_ms;
+using bench::quantile;
+using bench::resident_bytes;
+
 constexpr int kKeyframesPerLap = 21;
 constexpr int kLoopEvery = 27;
-
-/// Processor time of the process in all its threads: the same on a machine that others use too.
-double processor_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
-
-double quantile(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
-double resident_bytes() {
-  double pages_in_all = 0.0;
-  double resident = 0.0;
-  std::ifstream("/proc/self/statm") >> pages_in_all >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
 
 /// A loop from keyframe `from` to the place one to three laps ago, as an exact match would measure it.
 LoopMeasurement true_loop(const testing::Drive& drive, int from) {

@@ -52,7 +52,8 @@ struct BackendConfig {
   double loop_max_widening_m = 8.0;
   std::string loop_correction_gate = "distance";
   double loop_drift_scale = 2.0;
-  double loop_support_beyond_m = 2.0;
+  double loop_support_beyond_m = 1.0;
+  double loop_support_apart_m = 15.0;
   int loop_trial_keyframes = 10;
 
   // Batch solution that checks the incremental one.
@@ -114,6 +115,9 @@ struct BackendConfig {
                  "their errors are correlated");
     visit.number("loop_support_beyond_m", self.loop_support_beyond_m, {0.01, 1000.0}, "m",
                  "a loop about whose place odometry is less sure than this waits until a second one agrees with it");
+    visit.number("loop_support_apart_m", self.loop_support_apart_m, {0.0, 1000.0}, "m",
+                 "the second one, unless it is in the graph already, at both ends at least so far from the first: "
+                 "nearby it would look the same in any place that looks alike");
     visit.integer("loop_trial_keyframes", self.loop_trial_keyframes, {1, 10000}, "keyframes",
                   "a loop on trial that so many later keyframes do not contradict is kept");
     visit.number("shadow_swap_m", self.shadow_swap_m, {1e-6, 10.0}, "m",

@@ -55,12 +55,13 @@ class Hearing {
   }
   [[nodiscard]] std::size_t believed_count() const { return believed_.size(); }
 
-  /// Odometry pins the loop down by itself, or another believed loop does.
+  /// Odometry pins the loop down by itself, or another believed loop does: one that is in the graph, or one from so far
+  /// away that a place that merely looks alike would not explain both.
   [[nodiscard]] bool supported(std::int32_t number) const {
     const LoopClaim& claim = claims_[place(number).value()];
     if (open_distance(claim.from, claim.to, state_.odometry, rule_) <= config_.loop_support_beyond_m) return true;
     return std::ranges::any_of(believed_, [&](std::size_t i) {
-      return loops_[i].number != number &&
+      return loops_[i].number != number && (is_in_graph(loops_[i].number) || are_apart(claim, claims_[i])) &&
              open_distance(claim, claims_[i], state_.odometry, rule_) <= config_.loop_support_beyond_m;
     });
   }
@@ -72,6 +73,17 @@ class Hearing {
     const auto found = std::ranges::find(loops_, number, &GraphLoop::number);
     if (found == loops_.end()) return std::nullopt;
     return static_cast<std::size_t>(found - loops_.begin());
+  }
+
+  [[nodiscard]] bool is_in_graph(std::int32_t number) const {
+    return std::ranges::find(state_.loops, number, &GraphLoop::number) != state_.loops.end();
+  }
+
+  [[nodiscard]] bool are_apart(const LoopClaim& a, const LoopClaim& b) const {
+    const auto distance = [&](std::size_t i, std::size_t k) {
+      return state_.odometry.T_from_to(i, k).translation.norm();
+    };
+    return std::min(distance(a.from, b.from), distance(a.to, b.to)) >= config_.loop_support_apart_m;
   }
 
   bool agree(std::size_t i, std::size_t k) {
@@ -131,22 +143,28 @@ void withdraw_outvoted(const Hearing& hearing, IncrementalSolver& solver, Smooth
   }
 }
 
+/// Whatever still waits says why, once.
+void explain_waiting(const Hearing& hearing, SmootherState& state, LoopEvents& events) {
+  for (GraphLoop& loop : state.waiting) {
+    const LoopReason reason = hearing.believed(loop.number) ? LoopReason::kNeedsSupport : LoopReason::kContradictsLoops;
+    const bool news = loop.result.reason != reason;
+    loop.result.reason = reason;
+    loop.result.reason_text = text(reason);
+    if (news) events.push_back(loop);
+  }
+}
+
 void enter_believed(const Hearing& hearing, const BackendConfig& config, IncrementalSolver& solver,
                     SmootherState& state, LoopEvents& events) {
-  std::vector<GraphLoop> waiting = std::exchange(state.waiting, {});
-  for (GraphLoop& loop : waiting) {
-    const bool believed = hearing.believed(loop.number);
-    if (!believed || !hearing.supported(loop.number)) {
-      const LoopReason reason = believed ? LoopReason::kNeedsSupport : LoopReason::kContradictsLoops;
-      const bool news = loop.result.reason != reason;
-      loop.result.reason = reason;
-      loop.result.reason_text = text(reason);
-      if (news) events.push_back(loop);
-      state.waiting.push_back(std::move(loop));
-      continue;
-    }
-    const GraphLoop copy = loop;
-    const LoopEntry entry = enter_graph(std::move(loop), config, solver, state);
+  const auto deserves = [&](const GraphLoop& loop) {
+    return hearing.believed(loop.number) && hearing.supported(loop.number);
+  };
+  // One that enters may support those that waited before it.
+  for (auto next = std::ranges::find_if(state.waiting, deserves); next != state.waiting.end();
+       next = std::ranges::find_if(state.waiting, deserves)) {
+    const GraphLoop copy = *next;
+    state.waiting.erase(next);
+    const LoopEntry entry = enter_graph(copy, config, solver, state);
     if (!entry.entered) {
       events.push_back(copy);
       events.back().result.reason = LoopReason::kSolverRefused;
@@ -157,6 +175,7 @@ void enter_believed(const Hearing& hearing, const BackendConfig& config, Increme
     events.push_back(state.loops.back());
     withdraw_contradicted(entry.rise, config, solver, state, events);
   }
+  explain_waiting(hearing, state, events);
   if (state.waiting.size() > kMostWaiting) state.waiting.erase(state.waiting.begin());
 }
 

@@ -34,7 +34,7 @@ const char* text(LoopReason reason) {
     case LoopReason::kContradictsLoops:
       return "contradicts other loops";
     case LoopReason::kNeedsSupport:
-      return "waits for a second loop that agrees";
+      return "waits for a second loop that agrees, at another place";
     case LoopReason::kKept:
       return "kept";
     case LoopReason::kVetoed:

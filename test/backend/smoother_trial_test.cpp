@@ -105,21 +105,28 @@ TEST(LoopTrial, AWrongLoopAmongTrueOnesWaitsOutside) {
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(run.poses()[i].translation, before[i].translation);
 }
 
-TEST(LoopTrial, WaitsForASecondWitnessWhereOdometryIsVague) {
+TEST(LoopTrial, WaitsForASecondWitnessElsewhereWhereOdometryIsVague) {
   BackendConfig config = without_search();
   config.loop_support_beyond_m = 0.5;
+  config.loop_support_apart_m = 10.0;
   VagueDrive run(config);
-  const SmootherUpdate first = run.add_loop(24, 2, 0.0);
-  EXPECT_EQ(first.loop->reason, LoopReason::kNeedsSupport);
-  EXPECT_EQ(first.loop->stage, LoopStage::kVerified);
+  // 3 m from each other, the two would agree in any place that looks like theirs.
+  for (const auto& [from, to] : {std::pair{24, 2}, {25, 3}}) {
+    const SmootherUpdate update = run.add_loop(from, to, 0.0);
+    EXPECT_EQ(update.loop->reason, LoopReason::kNeedsSupport);
+    EXPECT_EQ(update.loop->stage, LoopStage::kVerified);
+  }
   EXPECT_EQ(run.smoother.stats().loops_kept, 0);
-  EXPECT_EQ(run.smoother.stats().loops_waiting, 1);
-  const SmootherUpdate second = run.add_loop(25, 3, 0.0);
-  EXPECT_TRUE(second.loop->accepted()) << second.loop->reason_text;
-  ASSERT_EQ(second.changed.size(), 1U);
-  EXPECT_TRUE(second.changed[0].accepted());
-  EXPECT_EQ(second.changed[0].from_id, 24);
-  EXPECT_EQ(run.smoother.stats().loops_kept, 2);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 2);
+  // 11 m from the first, 9 m from the second, which the first vouches for once it is in the graph.
+  const SmootherUpdate elsewhere = run.add_loop(28, 7, 0.0);
+  EXPECT_TRUE(elsewhere.loop->accepted()) << elsewhere.loop->reason_text;
+  ASSERT_EQ(elsewhere.changed.size(), 2U);
+  EXPECT_TRUE(elsewhere.changed[0].accepted());
+  EXPECT_EQ(elsewhere.changed[0].from_id, 24);
+  EXPECT_TRUE(elsewhere.changed[1].accepted());
+  EXPECT_EQ(elsewhere.changed[1].from_id, 25);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 3);
   EXPECT_EQ(run.smoother.stats().loops_waiting, 0);
 }
 
