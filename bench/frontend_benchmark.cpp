@@ -39,7 +39,12 @@ void count(benchmark::State& state, const Points& points) {
 void deskew_scan(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const Scan& scan = drive.scans.back();
-  for (auto _ : state) benchmark::DoNotOptimize(deskew(scan, drive.states.back(), drive.imu, drive.config.gravity_m));
+  Deskewer deskewer;
+  std::vector<CloudPoint> cloud;
+  for (auto _ : state) {
+    deskewer.deskew(scan, drive.states.back(), drive.imu, drive.config.gravity_m, cloud);
+    benchmark::DoNotOptimize(cloud.data());
+  }
   count(state, scan.points);
 }
 
@@ -48,7 +53,10 @@ void deskew_scan(benchmark::State& state, const std::string& sensor) {
 void downsample_scan(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const std::vector<CloudPoint> cloud = last_cloud(drive);
-  for (auto _ : state) benchmark::DoNotOptimize(voxel_downsample(cloud, drive.config.voxel_size_m));
+  VoxelThinner thinner;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(thinner.pick(std::span<const CloudPoint>(cloud), drive.config.voxel_size_m));
+  }
   count(state, cloud);
 }
 
@@ -58,10 +66,8 @@ void insert_into_map(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   LocalMap map = map_before_last(drive);
   const std::vector<CloudPoint> cloud = last_cloud(drive);
-  std::vector<Eigen::Vector3f> points;
-  for (const CloudPoint& point : cloud) points.push_back(point.position);
-  for (auto _ : state) map.insert(points, drive.states.back().T_odom_body, true);
-  count(state, points);
+  for (auto _ : state) map.insert(cloud, drive.states.back().T_odom_body, true);
+  count(state, cloud);
   state.counters["voxels"] = map.size();
 }
 

@@ -5,9 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "frontend/deskew.h"
 #include "frontend/reacquisition.h"
-#include "frontend/scan_selection.h"
 #include "frontend/standstill.h"
 #include "frontend/voxel_downsample.h"
 
@@ -20,13 +18,6 @@ constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of t
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
-
-std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
-  std::vector<Eigen::Vector3f> result;
-  result.reserve(cloud.size());
-  for (const CloudPoint& point : cloud) result.push_back(point.position);
-  return result;
-}
 
 double velocity_sigma(const FilterState& filter) {
   return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
@@ -48,6 +39,7 @@ Lio::Lio(const FrontendConfig& config, std::int32_t session, std::string note)
     : config_(config),
       session_(session),
       initialisation_(config),
+      selector_(config),
       matcher_(config),
       map_(config),
       drift_(config.map_drift),
@@ -184,9 +176,12 @@ ScanResult Lio::refuse(const Scan& scan, ScanReason reason) const {
   return result;
 }
 
-std::vector<CloudPoint> Lio::register_points(const Scan& scan) const {
-  if (config_.deskew) return deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m);
+std::vector<CloudPoint> Lio::register_points(const Scan& scan) {
   std::vector<CloudPoint> cloud;
+  if (config_.deskew) {
+    deskewer_.deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m, cloud);
+    return cloud;
+  }
   cloud.reserve(scan.points.size());
   for (const ScanPoint& point : scan.points) cloud.push_back({point.position, point.intensity});
   return cloud;
@@ -199,10 +194,10 @@ ScanResult Lio::process(const Scan& scan) {
     return refuse(scan, before_start ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
   }
   advance_to(scan.end_utime());
-  const ScanSelection selection = select_points(scan, config_);
+  const ScanSelection& selection = selector_.select(scan);
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
-  std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m);
+  std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
   MatchResult match = correct(cloud, sparse);
   match.stats.points = selection.in_range;
   filter_ = match.filter;
@@ -248,13 +243,12 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
     result.stats.reason = ScanReason::kMapEmpty;
   } else {
     const bool is_large = std::ssize(cloud) > config_.max_scan_points;
-    const std::vector<Eigen::Vector3f> points =
-        positions(is_large ? every_nth(sparse, config_.max_scan_points) : cloud);
+    every_nth(is_large ? sparse : cloud, config_.max_scan_points, match_points_);
     const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
-    const Pose T_start = is_lost ? reacquire(filter_, points, map_, config_) : filter_.nominal.T_odom_body;
+    const Pose T_start = is_lost ? reacquire(filter_, match_points_, map_, config_) : filter_.nominal.T_odom_body;
     const Matrix15d covariance = drift_.add_to(cautious_, filter_.nominal.T_odom_body);
     const int salient_since = drift_.sure_since(covariance.block<3, 3>(kPosition, kPosition), config_.match_radius_m);
-    result = matcher_.match(filter_, T_start, points, map_, salient_since);
+    result = matcher_.match(filter_, T_start, match_points_, map_, salient_since);
   }
   return result;
 }
@@ -280,7 +274,7 @@ void Lio::follow_moving_start(const Scan& scan, ScanReason reason, std::vector<C
   if (reason == ScanReason::kApplied) {
     // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
     cloud = register_points(scan);
-    sparse = voxel_downsample(cloud, config_.voxel_size_m);
+    sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
     map_.clear();
     velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
   } else if (is_contradiction(reason)) {
@@ -302,7 +296,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, ScanReason reason) {
   contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
   if (contradictions_ >= config_.reanchor_scans) begin_new_map();
   const bool confirmed = contradictions_ == 0 || map_.empty() || !config_.quarantine;
-  map_.insert(positions(cloud), filter_.nominal.T_odom_body, confirmed);
+  map_.insert(cloud, filter_.nominal.T_odom_body, confirmed);
   map_.slide(filter_.nominal.T_odom_body.translation);
 }
 

@@ -146,7 +146,7 @@ LocalMap::Region& LocalMap::find_or_add_region(const Eigen::Vector3i& coordinate
   return regions_.back();
 }
 
-LocalMap::Block& LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) {
+std::int32_t LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) {
   const Eigen::Vector3i parent = cube_of(coordinate);
   const int bit = bit_of(coordinate - kEdge * parent);
   Region& region = find_or_add_region(parent);
@@ -155,7 +155,7 @@ LocalMap::Block& LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) 
     region.blocks[bit] = static_cast<std::int32_t>(blocks_.size());
     blocks_.emplace_back().coordinate = coordinate;
   }
-  return blocks_[static_cast<std::size_t>(region.blocks[bit])];
+  return region.blocks[bit];
 }
 
 void LocalMap::rebuild_table(std::size_t capacity) {
@@ -181,23 +181,50 @@ void LocalMap::rebuild_regions() {
 }
 
 void LocalMap::insert(std::span<const Eigen::Vector3f> points_body, const Pose& T_odom_body, bool confirmed) {
+  insert_all(points_body, T_odom_body, confirmed, [](const Eigen::Vector3f& point) { return point; });
+}
+
+void LocalMap::insert(std::span<const CloudPoint> cloud_body, const Pose& T_odom_body, bool confirmed) {
+  insert_all(cloud_body, T_odom_body, confirmed, [](const CloudPoint& point) { return point.position; });
+}
+
+void LocalMap::insert_all(auto points, const Pose& T_odom_body, bool confirmed, auto position_of) {
   ++scans_;
-  inserted_points_ += std::ssize(points_body);
+  inserted_points_ += std::ssize(points);
   const Eigen::Matrix3d R = T_odom_body.rotation.toRotationMatrix();
-  for (const Eigen::Vector3f& point : points_body) {
-    insert_point(R * point.cast<double>() + T_odom_body.translation, confirmed);
+  // A scan stays in a block for some points before it goes on to the next.
+  std::int32_t block = kFree;
+  Eigen::Vector3i block_at = Eigen::Vector3i::Zero();
+  Eigen::Vector3d corner = Eigen::Vector3d::Zero();
+  std::array<Place, 32> places;
+  while (!points.empty()) {
+    const std::size_t count = std::min(places.size(), points.size());
+    // The lines of a batch are asked for before the first of them is needed.
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3d point = R * position_of(points[i]).template cast<double>() + T_odom_body.translation;
+      const Eigen::Vector3i voxel = voxel_of(point, voxel_size_);
+      const Eigen::Vector3i coordinate = cube_of(voxel);
+      if (block == kFree || coordinate != block_at) {
+        block = find_or_add_block(coordinate);
+        block_at = coordinate;
+        corner = kEdge * voxel_size_ * coordinate.cast<double>();
+      }
+      places[i] = {(point - corner).cast<float>(), block, bit_of(voxel - kEdge * coordinate)};
+      const Block& there = blocks_[static_cast<std::size_t>(block)];
+      __builtin_prefetch(&there.rows[places[i].bit / kEdge]);
+      __builtin_prefetch(&there.weight[places[i].bit]);
+      __builtin_prefetch(&there.occupied);
+    }
+    for (const Place& place : std::span(places).first(count)) insert_point(place, confirmed);
+    points = points.subspan(count);
   }
 }
 
-void LocalMap::insert_point(const Eigen::Vector3d& point, bool confirmed) {
-  const Eigen::Vector3i voxel = voxel_of(point, voxel_size_);
-  const Eigen::Vector3i coordinate = cube_of(voxel);
-  const Eigen::Vector3i inside = voxel - kEdge * coordinate;
-  const int bit = bit_of(inside);
+void LocalMap::insert_point(const Place& place, bool confirmed) {
+  Block& block = blocks_[static_cast<std::size_t>(place.block)];
+  const int bit = place.bit;
   const std::uint64_t flag = std::uint64_t{1} << bit;
-
-  Block& block = find_or_add_block(coordinate);
-  const Eigen::Vector3f local = (point - kEdge * voxel_size_ * coordinate.cast<double>()).cast<float>();
+  const Eigen::Vector3f& local = place.local;
   float& scan = block.rows[bit / kEdge].scan[bit % kEdge];
   const bool taken = (block.occupied & flag) != 0;
   const bool taken_confirmed = (block.confirmed & flag) != 0;
@@ -212,7 +239,7 @@ void LocalMap::insert_point(const Eigen::Vector3d& point, bool confirmed) {
     scan += share * (static_cast<float>(scans_) - scan);
     return;
   }
-  if (merges && !nearer_to_centre(local, block.point(bit), inside)) return;
+  if (merges && !nearer_to_centre(local, block.point(bit), bit)) return;
   if (!taken) ++size_;
   block.set_point(bit, local);
   scan = static_cast<float>(scans_);
@@ -221,8 +248,8 @@ void LocalMap::insert_point(const Eigen::Vector3d& point, bool confirmed) {
   if (confirmed) block.confirmed |= flag;
 }
 
-bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored,
-                                const Eigen::Vector3i& inside) const {
+bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored, int bit) const {
+  const Eigen::Vector3i inside(bit % kEdge, bit / kEdge % kEdge, bit / (kEdge * kEdge));
   const Eigen::Vector3f centre = ((inside.cast<double>().array() + 0.5) * voxel_size_).matrix().cast<float>();
   return (point - centre).squaredNorm() < (stored - centre).squaredNorm();
 }
