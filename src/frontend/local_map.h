@@ -93,9 +93,19 @@ class LocalMap {
     std::int32_t blocks[kCells] = {};                      ///< index into blocks_
   };
 
-  /// Calls visit(row, lanes, query relative to the block's corner [m]) for every row with confirmed points in the box
-  /// of half edge `radius` around the query; bit k of `lanes` says that voxel k of the row is one of them.
-  void for_each_row(const Eigen::Vector3d& query, double radius, auto&& visit) const;
+  /// Voxels from corner to corner, both included.
+  struct Box {
+    Eigen::Vector3i lo;
+    Eigen::Vector3i hi;
+  };
+
+  [[nodiscard]] Box box_around(const Eigen::Vector3d& query, double radius) const;
+  [[nodiscard]] Eigen::Vector3f relative_to(const Block& block, const Eigen::Vector3d& query) const;
+  /// Calls visit(block) for every block that a box meets.
+  void for_each_block(const Box& box, auto&& visit) const;
+  /// Calls visit(row, lanes) for every row of a block with confirmed points in the box; bit k of `lanes` says that
+  /// voxel k of the row is one of them.
+  static void for_each_row(const Block& block, const Box& box, auto&& visit);
   [[nodiscard]] const Region* find_region(const Eigen::Vector3i& coordinate) const;
   [[nodiscard]] Region& find_or_add_region(const Eigen::Vector3i& coordinate);
   [[nodiscard]] std::int32_t find_or_add_block(const Eigen::Vector3i& coordinate);  ///< index into blocks_
@@ -105,6 +115,8 @@ class LocalMap {
   void rebuild_regions();
   void rebuild_table(std::size_t capacity);
   [[nodiscard]] std::size_t slot_of(const Eigen::Vector3i& coordinate) const;
+
+  friend class NeighbourSearch;
 
   double voxel_size_;
   double match_radius_;
