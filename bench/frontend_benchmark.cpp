@@ -5,10 +5,13 @@
 // 2 MB of second-level cache, busy with other work: good to a fifth. Run on one core:
 //   taskset -c 1 build/release/bin/frontend_benchmark --benchmark_repetitions=5 --benchmark_report_aggregates_only=true
 
+#include <algorithm>
+
 #include <benchmark/benchmark.h>
 
 #include "frontend/deskew.h"
 #include "frontend/eskf.h"
+#include "frontend/neighbour_search.h"
 #include "frontend/plane_fit.h"
 #include "frontend/scan_matcher.h"
 #include "frontend/scan_update.h"
@@ -34,39 +37,46 @@ void count(benchmark::State& state, const Points& points) {
   state.counters["points"] = static_cast<double>(points.size());
 }
 
-// Bound by arithmetic: some fifty operations a point for a small rotation as a series. Large scans are thinned first,
-// so that all their points never come here.
+// Bound by arithmetic: some fifty operations for a point with an instant of its own, a small rotation as a series; 18
+// for one of a spinning LiDAR's column, which share a matrix. Large scans are thinned first, so that all their points
+// never come here.
 void deskew_scan(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const Scan& scan = drive.scans.back();
-  for (auto _ : state) benchmark::DoNotOptimize(deskew(scan, drive.states.back(), drive.imu, drive.config.gravity_m));
+  Deskewer deskewer;
+  std::vector<CloudPoint> cloud;
+  for (auto _ : state) {
+    deskewer.deskew(scan, drive.states.back(), drive.imu, drive.config.gravity_m, cloud);
+    benchmark::DoNotOptimize(cloud.data());
+  }
   count(state, scan.points);
 }
 
-// Bound by the hash table of the voxels, whose lines are met in the order of the scan and not of the table; the points
-// alone would stream in 0.4 ms for 128 beams.
+// Some 60 operations a point and one jump that is foreseen wrongly now and then; the lines of the table are asked for
+// a batch ahead. The points alone would stream in 0.4 ms for 128 beams.
 void downsample_scan(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const std::vector<CloudPoint> cloud = last_cloud(drive);
-  for (auto _ : state) benchmark::DoNotOptimize(voxel_downsample(cloud, drive.config.voxel_size_m));
+  VoxelThinner thinner;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(thinner.pick(std::span<const CloudPoint>(cloud), drive.config.voxel_size_m));
+  }
   count(state, cloud);
 }
 
-// 36 ns a point in voxels that the scan has met before: bound by the chain probe of the table - region - block - row of
-// four voxels, each waiting for the cache line of the one before, not by the few operations on the point.
+// In voxels that the scan has met before. The chain table, region, block is walked where the scan enters another block;
+// head, row and weight of the block, a cache line each, are asked for a batch ahead.
 void insert_into_map(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   LocalMap map = map_before_last(drive);
   const std::vector<CloudPoint> cloud = last_cloud(drive);
-  std::vector<Eigen::Vector3f> points;
-  for (const CloudPoint& point : cloud) points.push_back(point.position);
-  for (auto _ : state) map.insert(points, drive.states.back().T_odom_body, true);
-  count(state, points);
+  for (auto _ : state) map.insert(cloud, drive.states.back().T_odom_body, true);
+  count(state, cloud);
   state.counters["voxels"] = map.size();
 }
 
-// 190 to 230 ns a query for 11 to 13 neighbours, in five to eight rows of four voxels: 25 vector operations a row and
-// the row's one cache line. The dearest kernel of a match; to gain, keep neighbours or planes from scan to scan.
+// 11 to 13 neighbours in five to eight rows of four voxels, 25 vector operations and one cache line each. Of one query
+// alone half of the time is waiting for two of these lines, one after the other.
 void gather_neighbours(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const LocalMap map = map_before_last(drive);
@@ -82,6 +92,19 @@ void gather_neighbours(benchmark::State& state, const std::string& sensor) {
   }
   count(state, points);
   state.counters["neighbours"] = neighbours / static_cast<double>(points.size());
+}
+
+// The same as the matcher does it: sixteen queries together, lines asked for ahead.
+void search_neighbours(benchmark::State& state, const std::string& sensor) {
+  const RecordedDrive& drive = recorded_drive(sensor);
+  const LocalMap map = map_before_last(drive);
+  std::vector<Eigen::Vector3d> queries;
+  for (const Eigen::Vector3f& point : last_thinned(drive)) {
+    queries.emplace_back(drive.states.back().T_odom_body * point.cast<double>().eval());
+  }
+  NeighbourSearch search;
+  for (auto _ : state) benchmark::DoNotOptimize(search.gather(map, queries, drive.config.match_radius_m).data());
+  count(state, queries);
 }
 
 // 6 ns a voxel, each once in a quarter of a window: a stream over all blocks, and the table built anew. It happens
@@ -103,28 +126,26 @@ void slide_map(benchmark::State& state, const std::string& sensor) {
   state.counters["voxels"] = full.size();
 }
 
-// 150 to 160 ns: the steps to the smallest eigenvalue follow one from another, each with a division, so latency bounds
-// it, neither memory nor the number of operations. Several planes side by side in one vector register would gain.
-void fit_planes(benchmark::State& state, const std::string& sensor) {
+// A third is steps to the smallest eigenvalue, each waiting for a division, four planes side by side; the rest is cross
+// products and roots of one plane at a time.
+void fit_plane_to_each(benchmark::State& state, const std::string& sensor) {
   const RecordedDrive& drive = recorded_drive(sensor);
   const LocalMap map = map_before_last(drive);
   std::vector<NeighbourMoments> moments;
   for (const Eigen::Vector3f& point : last_thinned(drive)) {
     moments.push_back(map.gather(drive.states.back().T_odom_body * point.cast<double>().eval()));
   }
-  double planes = 0.0;
+  std::vector<PlaneFit> planes;
   for (auto _ : state) {
-    planes = 0.0;
-    for (const NeighbourMoments& each : moments) {
-      planes += fit_plane(each, drive.config).verdict == PlaneVerdict::kPlane ? 1.0 : 0.0;
-    }
-    benchmark::DoNotOptimize(planes);
+    fit_planes(moments, drive.config, drive.config.match_radius_m, planes);
+    benchmark::DoNotOptimize(planes.data());
   }
   count(state, moments);
-  state.counters["planes"] = planes / static_cast<double>(moments.size());
+  const auto found = std::ranges::count(planes, PlaneVerdict::kPlane, &PlaneFit::verdict);
+  state.counters["planes"] = static_cast<double>(found) / static_cast<double>(moments.size());
 }
 
-// 0.44 us a point, most of it gather and plane fit, met once as long as the iterate stays; the passes over
+// Most of it neighbourhood search and plane fit, met once as long as the iterate stays; the passes over
 // the constraints add some 100 ns a point each. Proportional to the points that go in, hence max_scan_points: a match
 // of 130,000 points costs no more than the 10,000 that last_thinned leaves.
 void match_scan(benchmark::State& state, const std::string& sensor) {
@@ -220,8 +241,9 @@ IGNIS_BOTH_SENSORS(deskew_scan);
 IGNIS_BOTH_SENSORS(downsample_scan);
 IGNIS_BOTH_SENSORS(insert_into_map);
 IGNIS_BOTH_SENSORS(gather_neighbours);
+IGNIS_BOTH_SENSORS(search_neighbours);
 IGNIS_BOTH_SENSORS(slide_map);
-IGNIS_BOTH_SENSORS(fit_planes);
+IGNIS_BOTH_SENSORS(fit_plane_to_each);
 IGNIS_BOTH_SENSORS(match_scan);
 BENCHMARK(predict_step);
 BENCHMARK(update_step);

@@ -61,13 +61,6 @@ RecordedDrive record_spinning() {
   return drive;
 }
 
-std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
-  std::vector<Eigen::Vector3f> points;
-  points.reserve(cloud.size());
-  for (const CloudPoint& point : cloud) points.push_back(point.position);
-  return points;
-}
-
 }  // namespace
 
 const RecordedDrive& recorded_drive(std::string_view sensor) {
@@ -81,7 +74,7 @@ LocalMap map_before_last(const RecordedDrive& drive) {
   LocalMap map(drive.config);
   for (std::size_t i = 0; i + 1 < drive.scans.size(); ++i) {
     const std::vector<CloudPoint> cloud = deskew(drive.scans[i], drive.states[i], drive.imu, drive.config.gravity_m);
-    map.insert(positions(cloud), drive.states[i].T_odom_body, true);
+    map.insert(cloud, drive.states[i].T_odom_body, true);
   }
   return map;
 }
@@ -92,8 +85,11 @@ std::vector<CloudPoint> last_cloud(const RecordedDrive& drive) {
 
 std::vector<Eigen::Vector3f> last_thinned(const RecordedDrive& drive) {
   const std::vector<CloudPoint> cloud = last_cloud(drive);
-  if (std::ssize(cloud) <= drive.config.max_scan_points) return positions(cloud);
-  return positions(every_nth(voxel_downsample(cloud, drive.config.voxel_size_m), drive.config.max_scan_points));
+  const bool is_large = std::ssize(cloud) > drive.config.max_scan_points;
+  std::vector<Eigen::Vector3f> points;
+  every_nth(is_large ? voxel_downsample(cloud, drive.config.voxel_size_m) : cloud, drive.config.max_scan_points,
+            points);
+  return points;
 }
 
 }  // namespace ignis::bench

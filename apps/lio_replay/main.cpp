@@ -87,7 +87,7 @@ runtime::ExitCode replay(const runtime::Application& application, const Options&
   ReplayProgress progress(first, last);
   const Pace pace(speed);
   input->run([&](const ImuSample& sample) { pipeline.add_imu(sample); },
-             [&](const Scan& scan) { pipeline.add_scan(scan); },
+             [&](Scan scan) { pipeline.add_scan(std::move(scan)); },
              [&](Utime utime) {
                if (utime > last) return false;
                progress.show(utime);

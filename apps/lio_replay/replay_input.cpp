@@ -155,20 +155,18 @@ void ReplayInput::count_missing() {
   inventory_.first_drop = earlier(inventory_.first_drop, gap);
 }
 
-void ReplayInput::run(const std::function<void(const ImuSample&)>& on_imu,
-                      const std::function<void(const Scan&)>& on_scan,
+void ReplayInput::run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(Scan)>& on_scan,
                       const std::function<bool(Utime)>& proceed) const {
-  messages::ScanAssembler assembler;
+  messages::EncodedScanAssembler assembler;
   PageRelease pages(log_);
   for (const Entry& entry : entries_) {
     if (!proceed(entry.utime)) return;
     pages.read(entry.data.size());
     imu_t imu;
-    scan_t part;
-    if (!entry.is_scan && messages::decode_checked(entry.data, imu)) {
+    if (entry.is_scan) {
+      if (std::optional<Scan> scan = assembler.add(entry.data)) on_scan(*std::move(scan));
+    } else if (messages::decode_checked(entry.data, imu)) {
       on_imu(messages::from_message(imu));
-    } else if (entry.is_scan && messages::decode_checked(entry.data, part)) {
-      if (const std::optional<Scan> scan = assembler.add(part)) on_scan(*scan);
     }
   }
 }

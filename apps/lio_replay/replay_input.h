@@ -51,7 +51,7 @@ class ReplayInput {
   [[nodiscard]] const RecordedResults& live_results() const { return live_results_; }
 
   /// Calls the handlers with every measurement, in time order; stops early when `proceed` returns false.
-  void run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(const Scan&)>& on_scan,
+  void run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(Scan)>& on_scan,
            const std::function<bool(Utime)>& proceed) const;
 
  private:

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "replay_pipeline.h"
 
+#include <utility>
+
 namespace ignis {
 namespace {
 
@@ -28,8 +30,8 @@ void ReplayPipeline::add_imu(const ImuSample& sample) {
   for (const ScanResult& scan : imu.scans) take(scan, frontend_timer_.newest_ms());
 }
 
-void ReplayPipeline::add_scan(const Scan& scan) {
-  const std::vector<ScanResult> scans = frontend_timer_.time([&] { return lio_.add_scan(scan); });
+void ReplayPipeline::add_scan(Scan scan) {
+  const std::vector<ScanResult> scans = frontend_timer_.time([&] { return lio_.add_scan(std::move(scan)); });
   for (const ScanResult& each : scans) take(each, frontend_timer_.newest_ms());
 }
 

@@ -51,7 +51,7 @@ class ReplayPipeline {
   ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener = nullptr);
 
   void add_imu(const ImuSample& sample);
-  void add_scan(const Scan& scan);
+  void add_scan(Scan scan);
 
   /// Places everything at its final pose. Call once, at the end.
   [[nodiscard]] ReplayResult finish();

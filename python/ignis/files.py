@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that appear under their final name only when they are complete."""
 
+import itertools
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ignis.errors import InputError
+
+_numbers = itertools.count()
 
 
 @contextmanager
@@ -15,7 +19,8 @@ def replacing(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} is a folder; give the name of a file to write")
     if not path.parent.is_dir():
         raise InputError(f"the folder {path.parent} does not exist; make it first")
-    temporary = path.with_name(path.name + ".tmp")
+    # A name of its own for each writer: of several that write the same file at once, each renames a whole one.
+    temporary = path.with_name(f"{path.name}.{os.getpid()}-{next(_numbers)}.tmp")
     try:
         yield temporary
         temporary.replace(path)

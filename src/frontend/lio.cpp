@@ -5,10 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "frontend/deskew.h"
 #include "frontend/reacquisition.h"
 #include "frontend/scan_instant.h"
-#include "frontend/scan_selection.h"
 #include "frontend/standstill.h"
 #include "frontend/voxel_downsample.h"
 
@@ -23,13 +21,6 @@ constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
 
-std::vector<Eigen::Vector3f> positions(const std::vector<CloudPoint>& cloud) {
-  std::vector<Eigen::Vector3f> result;
-  result.reserve(cloud.size());
-  for (const CloudPoint& point : cloud) result.push_back(point.position);
-  return result;
-}
-
 double velocity_sigma(const FilterState& filter) {
   return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
 }
@@ -40,6 +31,7 @@ Lio::Lio(const FrontendConfig& config, std::int32_t session, std::string note)
     : config_(config),
       session_(session),
       initialisation_(config),
+      selector_(config),
       matcher_(config),
       map_(config),
       drift_(config.map_drift),
@@ -171,9 +163,12 @@ ScanResult Lio::refuse(const Scan& scan, ScanReason reason) const {
   return result;
 }
 
-std::vector<CloudPoint> Lio::register_points(const Scan& scan) const {
-  if (config_.deskew) return deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m);
+std::vector<CloudPoint> Lio::register_points(const Scan& scan) {
   std::vector<CloudPoint> cloud;
+  if (config_.deskew) {
+    deskewer_.deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m, cloud);
+    return cloud;
+  }
   cloud.reserve(scan.points.size());
   for (const ScanPoint& point : scan.points) cloud.push_back({point.position, point.intensity});
   return cloud;
@@ -186,10 +181,10 @@ ScanResult Lio::process(const Scan& scan) {
     return refuse(scan, before_start ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
   }
   advance_to(scan.end_utime());
-  const ScanSelection selection = select_points(scan, config_);
+  const ScanSelection& selection = selector_.select(scan);
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
-  std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m);
+  std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
   const double age = mean_age(selection.scan);
   const double seen_age = age * new_share(filter_.covariance, mapped_velocity_variance_);
   MatchResult match = correct(cloud, sparse, seen_age);
@@ -199,7 +194,7 @@ ScanResult Lio::process(const Scan& scan) {
   count_correction(match, seen_age);
   if (age * (filter_.nominal.v_odom - predicted.nominal.v_odom).norm() > kDeskewTolerance) {
     cloud = register_points(selection.scan);
-    sparse = voxel_downsample(cloud, config_.voxel_size_m);
+    sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
   }
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
@@ -243,15 +238,14 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
     result.stats.reason = ScanReason::kMapEmpty;
   } else {
     const bool is_large = std::ssize(cloud) > config_.max_scan_points;
-    const std::vector<Eigen::Vector3f> points =
-        positions(is_large ? every_nth(sparse, config_.max_scan_points) : cloud);
+    every_nth(is_large ? sparse : cloud, config_.max_scan_points, match_points_);
     const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
-    const Pose T_start = is_lost ? reacquire(filter_, points, map_, config_) : filter_.nominal.T_odom_body;
+    const Pose T_start = is_lost ? reacquire(filter_, match_points_, map_, config_) : filter_.nominal.T_odom_body;
     const Matrix6d pose_covariance =
         cautious_.topLeftCorner<6, 6>() + drift_.pose_covariance(filter_.nominal.T_odom_body);
     const int salient_since = drift_.sure_since(pose_covariance.bottomRightCorner<3, 3>(), config_.match_radius_m);
     const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
-    result = matcher_.match(seen, T_start, points, map_, salient_since);
+    result = matcher_.match(seen, T_start, match_points_, map_, salient_since);
     const Eigen::Vector3d gained = result.filter.nominal.v_odom - filter_.nominal.v_odom;
     result.filter.nominal.T_odom_body.translation += age * gained;
     result.filter.covariance = with_position_at(result.filter.covariance, age);
@@ -306,7 +300,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& matc
   const bool confirmed = contradictions_ == 0 || map_.empty() || !config_.quarantine;
   const double share = map_.empty() ? 1.0 : 1.0 / std::max(match.map_age_scans, 1.0);
   mapped_velocity_variance_ += share * (velocity_variance(filter_.covariance) - mapped_velocity_variance_);
-  map_.insert(positions(cloud), filter_.nominal.T_odom_body, confirmed);
+  map_.insert(cloud, filter_.nominal.T_odom_body, confirmed);
   map_.slide(filter_.nominal.T_odom_body.translation);
 }
 

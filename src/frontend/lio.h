@@ -8,6 +8,7 @@
 
 #include "common/keyframe.h"
 #include "common/measurements.h"
+#include "frontend/deskew.h"
 #include "frontend/frontend_config.h"
 #include "frontend/imu_buffer.h"
 #include "frontend/imu_initialisation.h"
@@ -15,8 +16,10 @@
 #include "frontend/local_map.h"
 #include "frontend/map_drift.h"
 #include "frontend/scan_matcher.h"
+#include "frontend/scan_selection.h"
 #include "frontend/scan_stats.h"
 #include "frontend/trust_monitor.h"
+#include "frontend/voxel_thinner.h"
 
 namespace ignis {
 
@@ -95,7 +98,7 @@ class Lio {
   void begin_new_map();
   void coast_to(Utime utime);
   void use_standstill(ScanStats& stats);
-  [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan) const;
+  [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan);
   [[nodiscard]] bool learns_nothing() const;
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
@@ -112,6 +115,10 @@ class Lio {
   std::int32_t session_ = 0;
   ImuBuffer imu_;
   ImuInitialisation initialisation_;
+  ScanSelector selector_;
+  Deskewer deskewer_;
+  VoxelThinner thinner_;
+  std::vector<Eigen::Vector3f> match_points_;  ///< [m] body frame; of the scan at hand, kept for its memory
   ScanMatcher matcher_;
   LocalMap map_;
   MapDrift drift_;

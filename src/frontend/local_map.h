@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "common/byte_codec.h"
+#include "common/measurements.h"
 #include "common/pose.h"
 #include "frontend/frontend_config.h"
 #include "frontend/plane_fit.h"
@@ -32,6 +33,7 @@ class LocalMap {
 
   /// Registers the body points of the next scan at a pose.
   void insert(std::span<const Eigen::Vector3f> points_body, const Pose& T_odom_body, bool confirmed);
+  void insert(std::span<const CloudPoint> cloud_body, const Pose& T_odom_body, bool confirmed);
 
   /// Sums over the confirmed points within a radius [m] of a point.
   [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query, double radius) const;
@@ -78,24 +80,43 @@ class LocalMap {
     void set_point(int bit, const Eigen::Vector3f& local);
   };
 
+  /// Where a point goes.
+  struct Place {
+    Eigen::Vector3f local;  ///< [m] relative to the block's corner
+    std::int32_t block;     ///< index into blocks_
+    int bit;                ///< voxel within the block
+  };
+
   struct Region {
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of region edges
     std::uint64_t present = 0;                             ///< blocks that exist
     std::int32_t blocks[kCells] = {};                      ///< index into blocks_
   };
 
-  /// Calls visit(row, lanes, query relative to the block's corner [m]) for every row with confirmed points in the box
-  /// of half edge `radius` around the query; bit k of `lanes` says that voxel k of the row is one of them.
-  void for_each_row(const Eigen::Vector3d& query, double radius, auto&& visit) const;
+  /// Voxels from corner to corner, both included.
+  struct Box {
+    Eigen::Vector3i lo;
+    Eigen::Vector3i hi;
+  };
+
+  [[nodiscard]] Box box_around(const Eigen::Vector3d& query, double radius) const;
+  [[nodiscard]] Eigen::Vector3f relative_to(const Block& block, const Eigen::Vector3d& query) const;
+  /// Calls visit(block) for every block that a box meets.
+  void for_each_block(const Box& box, auto&& visit) const;
+  /// Calls visit(row, lanes) for every row of a block with confirmed points in the box; bit k of `lanes` says that
+  /// voxel k of the row is one of them.
+  static void for_each_row(const Block& block, const Box& box, auto&& visit);
   [[nodiscard]] const Region* find_region(const Eigen::Vector3i& coordinate) const;
   [[nodiscard]] Region& find_or_add_region(const Eigen::Vector3i& coordinate);
-  [[nodiscard]] Block& find_or_add_block(const Eigen::Vector3i& coordinate);
-  void insert_point(const Eigen::Vector3d& point, bool confirmed);
-  [[nodiscard]] bool nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored,
-                                      const Eigen::Vector3i& inside) const;
+  [[nodiscard]] std::int32_t find_or_add_block(const Eigen::Vector3i& coordinate);  ///< index into blocks_
+  void insert_all(auto points, const Pose& T_odom_body, bool confirmed, auto position_of);
+  void insert_point(const Place& place, bool confirmed);
+  [[nodiscard]] bool nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored, int bit) const;
   void rebuild_regions();
   void rebuild_table(std::size_t capacity);
   [[nodiscard]] std::size_t slot_of(const Eigen::Vector3i& coordinate) const;
+
+  friend class NeighbourSearch;
 
   double voxel_size_;
   double match_radius_;

@@ -20,8 +20,9 @@ constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say littl
 // A map of so many points, a second of L1 scans, adds as much to a distance as the point does. NIS of a standing L1 in
 // that second: 100 to 200 without this, 2 to 6 of 6 degrees of freedom with it.
 constexpr double kNoisyMapPoints = 20'000.0;
-constexpr double kShareOfNewestScan = 0.1;  // in running means: half a second of scans
-constexpr double kKnownShift = 0.1;         // m: a direction that salient points hold so well is not reported as open
+constexpr double kShareOfNewestScan = 0.1;   // in running means: half a second of scans
+constexpr double kKnownShift = 0.1;          // m: a direction that salient points hold so well is not reported as open
+constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
 constexpr auto kAll = [](const auto&) { return true; };
 
 Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body, const Eigen::Vector3d& normal) {
@@ -96,26 +97,42 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   double range_sum = 0.0;
   double scan_sum = 0.0;
   double variance_sum = 0.0;
-  for (const Eigen::Vector3f& point : points_body) {
-    const Eigen::Vector3d point_body = point.cast<double>();
-    const Eigen::Vector3d query = R * point_body + pose.translation;
-    PlaneFit plane = fit_plane(map.gather(query), config_);
-    // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
-    // where it is not.
-    if (plane.verdict == PlaneVerdict::kTooFewPoints && config_.wide_match_radius_m > 0.0) {
-      const double radius = config_.wide_match_radius_m;
-      plane = fit_plane(map.gather(query, radius), wide_config_, radius);
+  for (std::size_t begin = 0; begin < points_body.size(); begin += kPointsTogether) {
+    const auto points = points_body.subspan(begin, std::min(kPointsTogether, points_body.size() - begin));
+    queries_.clear();
+    for (const Eigen::Vector3f& point : points) queries_.emplace_back(R * point.cast<double>() + pose.translation);
+    find_planes(map);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const PlaneFit& plane = planes_[i];
+      if (plane.verdict != PlaneVerdict::kPlane) continue;
+      const Eigen::Vector3d point_body = points[i].cast<double>();
+      constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), 1.0});
+      range_sum += point_body.norm();
+      scan_sum += plane.mean_scan;
+      variance_sum += variance_across(plane);
     }
-    if (plane.verdict != PlaneVerdict::kPlane) continue;
-    constraints_.push_back({point_body, plane, plane.normal.dot(query + plane.offset), 1.0});
-    range_sum += point_body.norm();
-    scan_sum += plane.mean_scan;
-    variance_sum += variance_across(plane);
   }
   const double count = std::max(static_cast<double>(constraints_.size()), 1.0);
   mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / count, 0.1);
   mean_map_scan_ = scan_sum / count;
   pooled_variance_ = variance_sum / count;
+}
+
+void ScanMatcher::find_planes(const LocalMap& map) {
+  lonely_.clear();
+  lonely_at_.clear();
+  fit_planes(search_.gather(map, queries_, config_.match_radius_m), config_, config_.match_radius_m, planes_);
+  // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
+  // where it is not.
+  const double radius = config_.wide_match_radius_m;
+  if (!(radius > 0.0)) return;
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    if (planes_[i].verdict != PlaneVerdict::kTooFewPoints) continue;
+    lonely_.push_back(queries_[i]);
+    lonely_at_.push_back(i);
+  }
+  fit_planes(search_.gather(map, lonely_, radius), wide_config_, radius, wide_planes_);
+  for (std::size_t i = 0; i < wide_planes_.size(); ++i) planes_[lonely_at_[i]] = wide_planes_[i];
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {

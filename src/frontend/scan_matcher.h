@@ -10,6 +10,7 @@
 #include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
 #include "frontend/local_map.h"
+#include "frontend/neighbour_search.h"
 #include "frontend/plane_fit.h"
 #include "frontend/salient_points.h"
 #include "frontend/scan_stats.h"
@@ -69,6 +70,8 @@ class ScanMatcher {
   };
 
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
+  /// Replaces planes_ by those nearest to queries_.
+  void find_planes(const LocalMap& map);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);
@@ -92,6 +95,12 @@ class ScanMatcher {
 
   FrontendConfig config_;
   FrontendConfig wide_config_;  ///< gates of planes in the wide neighbourhood
+  NeighbourSearch search_;
+  std::vector<Eigen::Vector3d> queries_;  ///< [m] odom frame; of some points
+  std::vector<PlaneFit> planes_;          ///< [query]
+  std::vector<Eigen::Vector3d> lonely_;   ///< those of queries_ with too few neighbours
+  std::vector<std::size_t> lonely_at_;    ///< their places in queries_
+  std::vector<PlaneFit> wide_planes_;     ///< their planes
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;

@@ -1,30 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/scan_selection.h"
 
-#include "frontend/voxel_downsample.h"
-
 namespace ignis {
 
-ScanSelection select_points(const Scan& scan, const FrontendConfig& config) {
-  const double nearest2 = config.min_range_m * config.min_range_m;
-  const double farthest2 = config.max_range_m * config.max_range_m;
-  ScanSelection selection;
-  selection.scan.utime = scan.utime;
-  selection.scan.sequence = scan.sequence;
-  selection.scan.duration_us = scan.duration_us;
-  selection.scan.missing_packets = scan.missing_packets;
-  std::vector<ScanPoint>& points = selection.scan.points;
-  points.reserve(scan.points.size());
-  for (const ScanPoint& point : scan.points) {
-    // False for what is not finite, too.
+ScanSelector::ScanSelector(const FrontendConfig& config)
+    : nearest2_(config.min_range_m * config.min_range_m),
+      farthest2_(config.max_range_m * config.max_range_m),
+      voxel_(config.scan_voxel_m),
+      max_points_(config.max_scan_points) {}
+
+const ScanSelection& ScanSelector::select(const Scan& scan) {
+  selection_.scan.utime = scan.utime;
+  selection_.scan.sequence = scan.sequence;
+  selection_.scan.duration_us = scan.duration_us;
+  selection_.scan.missing_packets = scan.missing_packets;
+  selection_.in_range = 0;
+  const auto is_in_range = [&](const ScanPoint& point) {
     const double range2 = point.position.cast<double>().squaredNorm();
-    if (range2 >= nearest2 && range2 <= farthest2) points.push_back(point);
+    const bool yes = range2 >= nearest2_ && range2 <= farthest2_;  // no for what is not finite, too
+    selection_.in_range += yes ? 1 : 0;
+    return yes;
+  };
+  std::vector<ScanPoint>& points = selection_.scan.points;
+  points.clear();
+  if (voxel_ > 0.0 && std::ssize(scan.points) > max_points_) {
+    const auto picked = thinner_.pick(std::span<const ScanPoint>(scan.points), voxel_, is_in_range);
+    if (selection_.in_range > max_points_) {
+      for (const VoxelThinner::Picked& each : picked)
+        points.push_back(scan.points[static_cast<std::size_t>(each.point)]);
+      return selection_;
+    }
+    selection_.in_range = 0;  // few enough without thinning: from the beginning
   }
-  selection.in_range = static_cast<int>(points.size());
-  if (config.scan_voxel_m > 0.0 && selection.in_range > config.max_scan_points) {
-    points = voxel_downsample(std::span<const ScanPoint>(points), config.scan_voxel_m);
+  for (const ScanPoint& point : scan.points) {
+    if (is_in_range(point)) points.push_back(point);
   }
-  return selection;
+  return selection_;
 }
 
 }  // namespace ignis

@@ -3,6 +3,7 @@
 
 #include "common/measurements.h"
 #include "frontend/frontend_config.h"
+#include "frontend/voxel_thinner.h"
 
 namespace ignis {
 
@@ -14,7 +15,22 @@ struct ScanSelection {
 
 /// Drops what is not finite or out of range. A scan that still has more than max_scan_points is then thinned to one
 /// point per voxel of scan_voxel_m (0: not at all), before anything is spent on its points: at 130,000 a scan, moving
-/// each of them to the scan's end and into the map costs more than matching.
-[[nodiscard]] ScanSelection select_points(const Scan& scan, const FrontendConfig& config);
+/// each of them to the scan's end and into the map costs more than matching. Keeps its memory from scan to scan.
+class ScanSelector {
+ public:
+  /// Of `config`, the four fields named above.
+  explicit ScanSelector(const FrontendConfig& config);
+
+  /// Valid until the next call.
+  [[nodiscard]] const ScanSelection& select(const Scan& scan);
+
+ private:
+  double nearest2_;   ///< [m^2]
+  double farthest2_;  ///< [m^2]
+  double voxel_;      ///< [m]
+  int max_points_;
+  VoxelThinner thinner_;
+  ScanSelection selection_;
+};
 
 }  // namespace ignis

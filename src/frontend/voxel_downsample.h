@@ -5,15 +5,18 @@
 #include <vector>
 
 #include "common/measurements.h"
+#include "frontend/voxel_thinner.h"
 
 namespace ignis {
 
 /// One point per cubic voxel of the cloud's own frame: the one nearest the voxel's centre. Order of first appearance.
 /// Positions must be finite.
 [[nodiscard]] std::vector<CloudPoint> voxel_downsample(std::span<const CloudPoint> cloud, double voxel_size_m);
-[[nodiscard]] std::vector<ScanPoint> voxel_downsample(std::span<const ScanPoint> cloud, double voxel_size_m);
+/// The same with the memory of a thinner that serves a stream of clouds.
+[[nodiscard]] std::vector<CloudPoint> voxel_downsample(std::span<const CloudPoint> cloud, double voxel_size_m,
+                                                       VoxelThinner& thinner);
 
-/// At most `max_points` points of a cloud, evenly spread over its order.
-[[nodiscard]] std::vector<CloudPoint> every_nth(std::span<const CloudPoint> cloud, int max_points);
+/// Replaces `positions` by those of at most `max_points` points of a cloud, evenly spread over its order.
+void every_nth(std::span<const CloudPoint> cloud, int max_points, std::vector<Eigen::Vector3f>& positions);
 
 }  // namespace ignis

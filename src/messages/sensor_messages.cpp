@@ -2,6 +2,7 @@
 #include "messages/sensor_messages.h"
 
 #include <algorithm>
+#include <bit>
 
 #include <boost/endian/conversion.hpp>
 
@@ -9,6 +10,45 @@
 #include "messages/length_check.h"
 
 namespace ignis::messages {
+namespace {
+
+using boost::endian::load_big_s16;
+using boost::endian::load_big_s32;
+using boost::endian::load_big_s64;
+
+// Offsets in an encoded scan_t behind the fingerprint; order of the fields in scan_t.lcm.
+constexpr std::size_t kSequenceAt = 8;
+constexpr std::size_t kPartAt = 12;
+constexpr std::size_t kPartCountAt = 14;
+constexpr std::size_t kDurationAt = 16;
+constexpr std::size_t kMissingPacketsAt = 20;
+constexpr std::size_t kPointCountAt = 24;
+constexpr std::size_t kArraysAt = 28;
+constexpr std::size_t kNumberBytes = 4;  // of an element of each array
+
+const unsigned char* bytes_of(std::span<const std::byte> body) {
+  return reinterpret_cast<const unsigned char*>(body.data());
+}
+
+std::size_t point_count(std::span<const std::byte> body) {
+  return static_cast<std::size_t>(load_big_s32(bytes_of(body) + kPointCountAt));
+}
+
+/// The points of a part into the places from `to` on.
+void read_points(std::span<const std::byte> body, ScanPoint* to) {
+  const std::size_t count = point_count(body);
+  const auto number = [arrays = bytes_of(body) + kArraysAt, count](std::size_t array, std::size_t i) {
+    return load_big_s32(arrays + kNumberBytes * (array * count + i));
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    to[i].position = {std::bit_cast<float>(number(0, i)), std::bit_cast<float>(number(1, i)),
+                      std::bit_cast<float>(number(2, i))};
+    to[i].intensity = std::bit_cast<float>(number(3, i));
+    to[i].dt_us = number(4, i);
+  }
+}
+
+}  // namespace
 
 imu_t to_message(const ImuSample& sample, float temperature) {
   imu_t message;
@@ -59,25 +99,49 @@ std::vector<scan_t> to_messages(const Scan& scan) {
 
 std::optional<ScanHead> read_scan_head(std::span<const std::byte> data) {
   if (!is_whole<scan_t>(data)) return std::nullopt;
-  // Order of the fields in scan_t.lcm.
-  const auto* body = reinterpret_cast<const unsigned char*>(data.data()) + kFingerprintBytes;
-  const ScanHead head{.utime = boost::endian::load_big_s64(body),
-                      .sequence = boost::endian::load_big_s32(body + 8),
-                      .part = boost::endian::load_big_s16(body + 12),
-                      .part_count = boost::endian::load_big_s16(body + 14)};
+  const unsigned char* body = bytes_of(data.subspan(kFingerprintBytes));
+  const ScanHead head{.utime = load_big_s64(body),
+                      .sequence = load_big_s32(body + kSequenceAt),
+                      .part = load_big_s16(body + kPartAt),
+                      .part_count = load_big_s16(body + kPartCountAt)};
   if (!stamps_are_possible(head)) return std::nullopt;
   return head;
+}
+
+std::optional<Scan> EncodedScanAssembler::add(std::span<const std::byte> data) {
+  const std::optional<ScanHead> head = read_scan_head(data);
+  if (!head) return std::nullopt;
+  const auto parts = parts_.add({head->sequence, head->part, head->part_count, data.subspan(kFingerprintBytes)});
+  if (!parts) return std::nullopt;
+  const unsigned char* first = bytes_of(parts->front().body);
+  Scan scan{.utime = load_big_s64(first),
+            .sequence = load_big_s32(first + kSequenceAt),
+            .duration_us = load_big_s32(first + kDurationAt),
+            .missing_packets = load_big_s32(first + kMissingPacketsAt),
+            .points = {}};
+  std::size_t total = 0;
+  for (const Part& part : *parts) total += point_count(part.body);
+  scan.points.resize(total);
+  std::size_t filled = 0;
+  for (const Part& part : *parts) {
+    read_points(part.body, scan.points.data() + filled);
+    filled += point_count(part.body);
+  }
+  return scan;
 }
 
 std::optional<Scan> ScanAssembler::add(const scan_t& part) {
   const std::optional<std::vector<scan_t>> parts = parts_.add(part);
   if (!parts) return std::nullopt;
   const scan_t& first = parts->front();
+  std::size_t total = 0;
+  for (const scan_t& each : *parts) total += each.x.size();
   Scan scan{.utime = first.utime,
             .sequence = first.sequence,
             .duration_us = first.duration_us,
             .missing_packets = first.missing_packets,
             .points = {}};
+  scan.points.reserve(total);
   for (const scan_t& each : *parts) {
     for (std::size_t i = 0; i < each.x.size(); ++i) {
       scan.points.push_back(

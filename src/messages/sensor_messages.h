@@ -33,6 +33,25 @@ struct ScanHead {
 /// Reads the head without the points; nothing where decode_checked() would refuse the message.
 [[nodiscard]] std::optional<ScanHead> read_scan_head(std::span<const std::byte> data);
 
+/// Puts scans together straight from encoded parts whose bytes stay where they are, such as those of a mapped log: the
+/// points are read once, from the log into the scan. What comes out is what ScanAssembler makes of the decoded parts.
+class EncodedScanAssembler {
+ public:
+  /// A complete scan, or nothing yet or not from what read_scan_head() refuses. `data` has to outlive the parts that
+  /// are still waited for.
+  [[nodiscard]] std::optional<Scan> add(std::span<const std::byte> data);
+
+ private:
+  struct Part {
+    std::int32_t sequence = 0;
+    std::int16_t part = 0;
+    std::int16_t part_count = 0;
+    std::span<const std::byte> body;  ///< behind the fingerprint
+  };
+
+  PartAssembler<Part> parts_;
+};
+
 /// Puts the parts of scans together again.
 class ScanAssembler {
  public:

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "common/so3.h"
 #include "frontend/synthetic_world.h"
@@ -103,6 +105,26 @@ TEST(Deskew, ClampsInstantsOutsideTheScan) {
   EXPECT_NEAR(cloud[1].position.x(), 3.0F, 1e-5F);
 }
 
+/// A drive whose points are measured four at a time, as the columns of a spinning LiDAR, and the same points one by
+/// one.
+TEST(Deskew, MovesPointsOfOneInstantAsItMovesEachAlone) {
+  const test::Trajectory truth = [](double t) {
+    return Pose{so3::exp({0.1 * t, 3.0 * t, 0.0}), {0.4 * std::sin(3.0 * t), 0.1 * t, -2.0 * t}};
+  };
+  const test::Drive drive = test::simulate(kCube, truth, 0.3, ideal_sensors(), 1);
+  Scan columns = drive.scans[2];
+  for (std::size_t i = 0; i < columns.points.size(); ++i) columns.points[i].dt_us = columns.points[i / 4 * 4].dt_us;
+  const NavState end = state_at(truth, 0.15, columns.end_utime());
+  const auto together = deskew(columns, end, drive.imu, kGravity);
+  ASSERT_EQ(together.size(), columns.points.size());
+  for (std::size_t i = 0; i < columns.points.size(); ++i) {
+    Scan alone = columns;
+    alone.points = {columns.points[i]};
+    const auto point = deskew(alone, end, drive.imu, kGravity);
+    ASSERT_LT((together[i].position - point.front().position).norm(), 1e-6F) << "point " << i;
+  }
+}
+
 TEST(VoxelDownsample, KeepsOnePointPerVoxelNearestItsCentre) {
   const std::vector<CloudPoint> cloud = {
       {{0.01F, 0.01F, 0.01F}, 1.0F}, {{0.12F, 0.1F, 0.1F}, 2.0F}, {{-0.01F, 0.1F, 0.1F}, 3.0F}};
@@ -112,13 +134,60 @@ TEST(VoxelDownsample, KeepsOnePointPerVoxelNearestItsCentre) {
   EXPECT_EQ(kept[1].intensity, 3.0F);
 }
 
+/// The point nearest the centre of each voxel, by exhaustive search.
+std::vector<std::int32_t> picked_by_search(const std::vector<CloudPoint>& cloud, float edge) {
+  std::vector<Eigen::Vector3f> centres;
+  std::vector<std::int32_t> picked;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f centre = edge * ((cloud[i].position * (1.0F / edge)).array().floor() + 0.5F);
+    const auto known = static_cast<std::size_t>(std::ranges::find(centres, centre) - centres.begin());
+    if (known == centres.size()) {
+      centres.push_back(centre);
+      picked.push_back(static_cast<std::int32_t>(i));
+    } else if ((cloud[i].position - centre).squaredNorm() <
+               (cloud[static_cast<std::size_t>(picked[known])].position - centre).squaredNorm()) {
+      picked[known] = static_cast<std::int32_t>(i);
+    }
+  }
+  return picked;
+}
+
+TEST(VoxelThinner, PicksWhatASearchFindsFromCloudToCloud) {
+  std::mt19937 random(7);
+  VoxelThinner thinner;
+  for (const int points : {3000, 0, 9000, 50, 3000}) {  // grows, and goes on with what it has
+    // A floor, a wall along z and some points between: rows of voxels along every axis.
+    std::uniform_real_distribution<float> place(-6.0F, 6.0F);
+    std::vector<CloudPoint> cloud;
+    for (int i = 0; i < points; ++i) {
+      Eigen::Vector3f at(place(random), place(random), place(random));
+      if (i % 3 != 2) at[i % 3] = -1.03F;
+      cloud.push_back({at, 0.0F});
+    }
+    std::vector<std::int32_t> picked;
+    for (const auto& each : thinner.pick(std::span<const CloudPoint>(cloud), 0.25)) picked.push_back(each.point);
+    ASSERT_EQ(picked, picked_by_search(cloud, 0.25F)) << points;
+  }
+}
+
+TEST(VoxelThinner, LeavesOutWhatIsNotAccepted) {
+  const std::vector<CloudPoint> cloud = {{{0.1F, 0.1F, 0.1F}, 1.0F}, {{0.12F, 0.1F, 0.1F}, 2.0F}};
+  VoxelThinner thinner;
+  const auto picked = thinner.pick(std::span<const CloudPoint>(cloud), 0.2,
+                                   [](const CloudPoint& point) { return point.intensity > 1.5F; });
+  ASSERT_EQ(picked.size(), 1U);
+  EXPECT_EQ(picked[0].point, 1);
+}
+
 TEST(EveryNth, ThinsLargeCloudsToTheBoundAndLeavesSmallOnesAlone) {
   std::vector<CloudPoint> cloud;
   for (int i = 0; i < 5000; ++i) cloud.push_back({{static_cast<float>(i), 0.0F, 0.0F}, 0.0F});
-  EXPECT_EQ(every_nth(cloud, 1000).size(), 1000U);
-  EXPECT_EQ(every_nth(cloud, 5000).size(), 5000U);
-  const auto thinned = every_nth(cloud, 1000);
-  EXPECT_GT(thinned.back().position.x(), 4900.0F) << "evenly spread over the whole scan";
+  std::vector<Eigen::Vector3f> positions = {Eigen::Vector3f::Ones()};
+  every_nth(cloud, 5001, positions);
+  EXPECT_EQ(positions.size(), 5000U);
+  every_nth(cloud, 1000, positions);
+  EXPECT_EQ(positions.size(), 1000U);
+  EXPECT_GT(positions.back().x(), 4900.0F) << "evenly spread over the whole scan";
 }
 
 }  // namespace

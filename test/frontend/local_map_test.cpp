@@ -7,6 +7,7 @@
 #include <random>
 
 #include "common/so3.h"
+#include "frontend/neighbour_search.h"
 
 namespace ignis {
 namespace {
@@ -40,6 +41,27 @@ TEST(LocalMap, GathersExactlyWhatABruteForceSearchFinds) {
     EXPECT_EQ(found.count, expected.count);
     EXPECT_LT((found.sum - expected.sum).norm(), 1e-4);
     EXPECT_LT((found.sum_outer - expected.sum_outer).norm(), 1e-4);
+  }
+}
+
+TEST(NeighbourSearch, GathersForManyQueriesToTheBitWhatTheMapGathersForEach) {
+  const FrontendConfig config;
+  LocalMap map(config);
+  map.insert(random_points(1, 20000, 4.0F), {}, true);
+  map.insert(random_points(3, 3000, 8.0F), {}, false);
+  NeighbourSearch search;
+  for (const int count : {0, 1, 16, 200, 37}) {
+    std::vector<Eigen::Vector3d> queries;
+    for (const Eigen::Vector3f& at : random_points(2, count, 6.0F)) queries.push_back(at.cast<double>());
+    const std::span<const NeighbourMoments> found = search.gather(map, queries, 0.45);
+    ASSERT_EQ(found.size(), queries.size());
+    for (std::size_t i = 0; i < queries.size(); ++i) {
+      const NeighbourMoments expected = map.gather(queries[i], 0.45);
+      ASSERT_EQ(found[i].count, expected.count);
+      ASSERT_EQ(found[i].scan_sum, expected.scan_sum);
+      ASSERT_EQ(found[i].sum, expected.sum);
+      ASSERT_EQ(found[i].sum_outer, expected.sum_outer);
+    }
   }
 }
 

@@ -33,7 +33,8 @@ TEST(ScanSelection, DropsWhatIsNotFiniteOrOutOfRange) {
                  {{std::nanf(""), 0.0F, 1.0F}, 0.0F, 0},
                  {{kInfinity, 0.0F, 1.0F}, 0.0F, 0},
                  {{2.0F, 0.0F, 0.0F}, 9.0F, 3}};
-  const ScanSelection selection = select_points(scan, config);
+  ScanSelector selector(config);
+  const ScanSelection& selection = selector.select(scan);
   EXPECT_EQ(selection.in_range, 1);
   ASSERT_EQ(selection.scan.points.size(), 1U);
   EXPECT_EQ(selection.scan.points[0].intensity, 9.0F);
@@ -44,7 +45,8 @@ TEST(ScanSelection, KeepsTheHeadOfTheScanAndEveryPointOfASmallOne) {
   FrontendConfig config;
   config.scan_voxel_m = 1.0;
   const Scan scan = random_scan(config.max_scan_points);
-  const ScanSelection selection = select_points(scan, config);
+  ScanSelector selector(config);
+  const ScanSelection& selection = selector.select(scan);
   EXPECT_EQ(selection.scan.utime, 77);
   EXPECT_EQ(selection.scan.sequence, 5);
   EXPECT_EQ(selection.scan.duration_us, 100'000);
@@ -56,7 +58,8 @@ TEST(ScanSelection, LeavesOneMeasuredPointPerVoxelOfALargeScan) {
   FrontendConfig config;
   config.scan_voxel_m = 1.0;
   const Scan scan = random_scan(50'000);
-  const ScanSelection selection = select_points(scan, config);
+  ScanSelector selector(config);
+  const ScanSelection& selection = selector.select(scan);
   EXPECT_GT(selection.in_range, 40'000);
   EXPECT_LE(selection.scan.points.size(), 8U * 8U * 8U);
   EXPECT_GT(selection.scan.points.size(), 400U);
@@ -64,7 +67,7 @@ TEST(ScanSelection, LeavesOneMeasuredPointPerVoxelOfALargeScan) {
     EXPECT_EQ(point.position, scan.points[static_cast<std::size_t>(point.dt_us)].position) << "a point as measured";
   }
   config.scan_voxel_m = 0.0;
-  EXPECT_EQ(select_points(scan, config).scan.points.size(), static_cast<std::size_t>(selection.in_range));
+  EXPECT_EQ(ScanSelector(config).select(scan).scan.points.size(), static_cast<std::size_t>(selection.in_range));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "messages/sensor_messages.h"
 
 #include <limits>
+#include <ranges>
 
 #include <gtest/gtest.h>
 
@@ -76,6 +77,34 @@ TEST_P(ScanParts, FitOneDatagramEachAndComeTogetherAgain) {
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     ASSERT_EQ(back->points[i].position, scan.points[i].position);
     ASSERT_EQ(back->points[i].dt_us, scan.points[i].dt_us);
+  }
+}
+
+TEST_P(ScanParts, ReadFromTheirBytesAreTheDecodedOnesInAnyOrder) {
+  std::vector<std::vector<std::byte>> bytes;
+  ScanAssembler decoding;
+  std::optional<Scan> decoded;
+  for (const scan_t& part : to_messages(scan_of(GetParam()))) {
+    bytes.push_back(encoded(part));
+    decoded = decoding.add(part);
+  }
+  EncodedScanAssembler assembler;
+  std::optional<Scan> scan;
+  for (const std::vector<std::byte>& each : bytes | std::views::reverse) {
+    ASSERT_FALSE(scan);
+    ASSERT_FALSE(assembler.add(std::span(each).first(each.size() - 1))) << "a damaged part is none";
+    scan = assembler.add(each);
+  }
+  ASSERT_TRUE(scan && decoded);
+  EXPECT_EQ(scan->utime, decoded->utime);
+  EXPECT_EQ(scan->sequence, decoded->sequence);
+  EXPECT_EQ(scan->duration_us, decoded->duration_us);
+  EXPECT_EQ(scan->missing_packets, decoded->missing_packets);
+  ASSERT_EQ(scan->points.size(), decoded->points.size());
+  for (std::size_t i = 0; i < scan->points.size(); ++i) {
+    ASSERT_EQ(scan->points[i].position, decoded->points[i].position);
+    ASSERT_EQ(scan->points[i].intensity, decoded->points[i].intensity);
+    ASSERT_EQ(scan->points[i].dt_us, decoded->points[i].dt_us);
   }
 }
 
