@@ -85,6 +85,7 @@ class Lio {
   [[nodiscard]] std::vector<ScanResult> process_pending();
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
+  [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse);
   void count_correction(const MatchResult& match);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);

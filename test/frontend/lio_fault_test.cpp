@@ -217,6 +217,27 @@ TEST(Fault_F7, AScanOfAMillionPointsIsMatchedWithTheConfiguredNumber) {
   EXPECT_LT(run.error_at_end(), 0.2);
 }
 
+TEST(Fault_F7, ScansTenTimesTooOftenAreRefusedByNameAndTheOthersKeepThePose) {
+  Drive input = drive();
+  std::vector<Scan> often;
+  for (const Scan& scan : input.scans) {
+    for (std::int32_t copy = 0; copy < 10; ++copy) {
+      Scan& shifted = often.emplace_back(scan);
+      shifted.utime += copy * 5'000;
+      shifted.sequence = static_cast<std::int32_t>(often.size());
+    }
+  }
+  input.scans = often;
+  const Watched run(input);
+  const auto refused = std::ranges::count_if(
+      run.scans, [](const ScanResult& result) { return result.stats.reason == ScanReason::kTooOften; });
+  EXPECT_GE(run.scans.size() + 1, often.size()) << "each scan has its verdict, but the last may wait for its samples";
+  EXPECT_GT(refused, std::ssize(often) * 3 / 4);
+  EXPECT_EQ(run.trust.back().second, Trust::kOk);
+  EXPECT_EQ(run.lio.session(), 0);
+  EXPECT_LT(run.error_at_end(), 0.2);
+}
+
 TEST(Fault_F8, PointTimesThatAreUnsortedOrOutsideTheScanAreClamped) {
   Drive input = drive();
   for (std::size_t i = 100; i < input.scans.size(); ++i) {

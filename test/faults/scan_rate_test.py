@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Row F7 at the real front end: for some seconds of a drive scans come at 200 Hz, ten times too often."""
+
+import math
+from pathlib import Path
+
+import ignis_lcm.ignis as types
+import numpy as np
+
+from fault_drive import FaultRun, Seen
+from ignis.logs import LogEvent, LogWriter, read_events
+
+TENFOLD_S = (5.0, 9.0)  # of the drive
+END_S = 10.5
+PERIOD_US = 5_000
+TIME_LIMIT_MS = 50.0
+SAME_PLACE_M = 0.05
+
+
+def tenfold(log: Path, target: Path) -> int:
+    """The drive with nine copies of each scan in between, each a little later; how many there are."""
+    events: list[LogEvent] = []
+    begin = next(iter(read_events(log))).utime
+    sequence = copies = 0
+    for event in read_events(log):
+        if event.utime > begin + 1e6 * END_S:
+            break
+        if event.channel != "L1_SCAN":
+            events.append(event)
+            continue
+        scan = types.scan_t.decode(event.data)
+        assert scan.part_count == 1
+        at = 1e-6 * (event.utime - begin)
+        for copy in range(10 if TENFOLD_S[0] < at < TENFOLD_S[1] else 1):
+            scan.sequence = sequence
+            events.append(event._replace(utime=event.utime + PERIOD_US * copy, data=scan.encode()))
+            scan.utime += PERIOD_US
+            sequence += 1
+            copies += copy > 0
+    with LogWriter(target) as out:
+        for event in sorted(events, key=lambda each: each.utime):
+            out.write(*event)
+    return copies
+
+
+def test_fault_f7_scans_ten_times_too_often_are_refused_by_name_and_the_pose_stays(
+    drive_log: Path, undisturbed: Seen, tmp_path: Path
+) -> None:
+    copies = tenfold(drive_log, tmp_path / "tenfold.lcmlog")
+    stats: list[types.scan_stats_t] = []
+    with FaultRun(tmp_path, ("lio_frontend", "graph_backend")) as run:
+        run.bus.subscribe("LIO_SCAN_STATS", lambda _, data: stats.append(types.scan_stats_t.decode(data)))
+        run.play(tmp_path / "tenfold.lcmlog", speed=1.0)
+        newest = run.seen.health["lio_frontend"][-1]
+    refused = [each for each in stats if each.reason == types.scan_stats_t.TOO_OFTEN]
+    spent = np.array([each.time_spent_ms for each in stats])
+    print(f"{copies} copies, {len(refused)} refused, 99 % within {np.percentile(spent, 99):.1f} ms")
+    assert len(refused) > 0.7 * copies and all(each.reason_text for each in refused)
+    assert np.percentile(spent, 99) < TIME_LIMIT_MS
+    assert newest.state == newest.OK and newest.resets == 0, newest.state_text
+    last = run.seen.smoothed[-1]
+    same = min(undisturbed.smoothed, key=lambda state: abs(state.utime - last.utime))
+    assert abs(same.utime - last.utime) < PERIOD_US
+    assert math.dist(last.position, same.position) < SAME_PLACE_M
