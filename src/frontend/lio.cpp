@@ -93,8 +93,10 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   ImuResult result;
   if (resumed_from_) close_gap(sample.utime);
   if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
+  const std::optional<Utime> before = imu_.empty() ? std::nullopt : std::optional(imu_.newest());
   result.fault = imu_.add(sample);
   if (result.fault != ImuFault::kNone) return result;
+  if (before && bridge_silence(*before, sample.utime) == Bridge::kTooLong) return result;
   trust_.note_imu(sample.utime);
   if (sample.saturated) last_clipped_ = sample.utime;
 

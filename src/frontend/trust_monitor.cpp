@@ -129,7 +129,9 @@ std::string TrustMonitor::reason() const {
   if (disagreement() <= kMaxDisagreement && uncertain_start_) {
     return std::format("new session after a restart, {} applied scans to go", scans_to_confirm_);
   }
-  if (resumed_) return std::format("resumed after a restart, {} applied scans to go", scans_to_confirm_);
+  if (resumed_)
+    return std::format("resumed after a restart or a silence of both streams, {} applied scans to go",
+                       scans_to_confirm_);
   if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
   if (disagreement() > kMaxDisagreement) {
     return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),
