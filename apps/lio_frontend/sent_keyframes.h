@@ -11,7 +11,7 @@
 namespace ignis {
 
 /// The newest keyframes as they were sent, for those who ask for them again. Bounded in number; a keyframe takes what
-/// its messages take, about a quarter of the keyframe itself.
+/// its messages take, about half of the keyframe itself.
 class SentKeyframes {
  public:
   explicit SentKeyframes(std::size_t limit) : limit_(limit) {}
