@@ -67,6 +67,15 @@ describe("StreamSession", () => {
     expect([sent.length, session.errors]).toEqual([4, 12]);
   });
 
+  it("asks again when the snapshot that it asked for never comes", () => {
+    offer("snapshot", 1, [voxel(1)]);
+    for (let sequence = 5; sequence < 20; sequence++) offer("delta", sequence, [voxel(2)]);
+    expect(sent.length).toBe(1);
+    tick = 50;
+    offer("delta", 20, [voxel(2)]);
+    expect(sent.length).toBe(2);
+  });
+
   it("begins anew after a reconnection", () => {
     offer("snapshot", 1, [voxel(1)]);
     session.begin();

@@ -9,7 +9,7 @@ import { VoxelStore } from "./voxel_store";
 /** What is held after a frame, beside what the server announced for it. */
 /** After so many snapshots in a row that do not fit the next one is asked for later [tenths of a second]. */
 const MOST_MISFITS = 3;
-const MISFIT_PAUSE = 50;
+const ASK_PAUSE = 50;
 
 export interface Applied {
   sequence: number;
@@ -35,7 +35,7 @@ export class StreamSession {
   errors = 0;
   private sequence: number | null = null; // null: only a snapshot helps
   private misfits = 0; // snapshots in a row without the announced checksum
-  private askedAt = 0; // tick of the newest demand because of a checksum
+  private askedAt = 0; // tick of the newest demand
   private announced: FrameAnnouncement | LoopClouds | null = null;
 
   constructor(private readonly store: VoxelStore, private readonly events: SessionEvents) {}
@@ -71,15 +71,15 @@ export class StreamSession {
     } catch (error) {
       if (!(error instanceof RangeError)) throw error;
       this.errors++;
-      this.resync();
+      this.resync(tick);
     }
   }
 
   private takeFrame(announced: FrameAnnouncement, buffer: ArrayBuffer, tick: number): void {
     const isSnapshot = announced.kind === "snapshot";
-    if (!isSnapshot && this.sequence === null) return; // a snapshot has been asked for and is on its way
     if (!isSnapshot && announced.base !== this.sequence) {
-      this.resync();
+      // A snapshot that has been asked for is on its way, unless something between swallowed it.
+      if (this.sequence !== null || tick - this.askedAt >= ASK_PAUSE) this.resync(tick);
       return;
     }
     const frame = decodeFrame(buffer);
@@ -108,12 +108,12 @@ export class StreamSession {
     if (isSnapshot) this.misfits = fits ? 0 : this.misfits + 1;
     if (fits) return;
     if (this.misfits > 0) this.errors++;
-    if (this.misfits >= MOST_MISFITS && tick - this.askedAt < MISFIT_PAUSE) return;
-    this.askedAt = tick;
-    this.resync();
+    if (this.misfits >= MOST_MISFITS && tick - this.askedAt < ASK_PAUSE) return;
+    this.resync(tick);
   }
 
-  private resync(): void {
+  private resync(tick: number): void {
+    this.askedAt = tick;
     this.sequence = null;
     this.resyncs++;
     this.events.send({ resync: true });
