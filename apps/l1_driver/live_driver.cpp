@@ -13,6 +13,17 @@ namespace {
 constexpr int kReadTimeoutMs = 50;
 constexpr std::chrono::milliseconds kReconnectPause{200};
 
+/// A supervised driver waits for a port that is not there yet, like for one that was lost.
+std::unique_ptr<l1::ByteLink> first_link(const DriverConfig& driver) {
+  try {
+    return l1::open_link(driver.port, driver.baud);
+  } catch (const l1::LinkError& error) {
+    if (!ServiceNotifier::is_supervised()) throw;
+    std::cerr << std::format("l1_driver: {}, trying again\n", error.what());
+    return nullptr;
+  }
+}
+
 }  // namespace
 
 LiveDriver::LiveDriver(const Application& application, const std::string& recording)
@@ -21,7 +32,7 @@ LiveDriver::LiveDriver(const Application& application, const std::string& record
       bus_(application),
       publisher_(bus_, decoder_, std::format("{} at {} baud", driver_.port, driver_.baud)),
       recording_(recording.empty() ? std::nullopt : std::optional<RawRecording>(recording)),
-      link_(l1::open_link(driver_.port, driver_.baud)) {}
+      link_(first_link(driver_)) {}
 
 ExitCode LiveDriver::run() {
   std::cout << std::format("l1_driver: reading {}\n", driver_.port) << std::flush;

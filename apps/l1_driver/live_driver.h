@@ -16,7 +16,7 @@ namespace ignis::runtime {
 class LiveDriver {
  public:
   /// `recording`: file for the raw bytes; empty: none. Throws UserError when that cannot be made, and
-  /// l1::LinkError when the link cannot be opened.
+  /// l1::LinkError when the link cannot be opened and no supervisor looks at what this process tells.
   LiveDriver(const Application& application, const std::string& recording);
 
   /// Until a stop is asked for.

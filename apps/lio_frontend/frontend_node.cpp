@@ -5,6 +5,7 @@
 #include <chrono>
 #include <format>
 #include <iostream>
+#include <set>
 
 #include "frontend/checkpoint.h"
 #include "runtime/channels.h"
@@ -49,7 +50,7 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
 
 void FrontendNode::resume() {
   lio_ = start_from_checkpoint(config_.frontend.filter, config_hash_, checkpoints_->load());
-  sent_keyframes_ = checkpoints_->load_keyframes(lio_.session());
+  for (const Keyframe& keyframe : checkpoints_->load_keyframes(lio_.session())) sent_keyframes_.add(keyframe);
 }
 
 /// Before anybody hears of a keyframe it is safe, and so is that its id is used: a successor neither reuses the id nor
@@ -80,8 +81,8 @@ void FrontendNode::on_imu(const imu_t& message) {
   }
   publish(result.scans, milliseconds);
   if (!result.state) return;
-  publish_state(*result.state, owed_covariance_ ? &*owed_covariance_ : nullptr);
-  owed_covariance_.reset();
+  const std::optional<Matrix15d> owed = order_.take_sample(lio_.session(), result.state->utime);
+  publish_state(*result.state, lio_.session(), owed ? &*owed : nullptr);
 }
 
 void FrontendNode::on_scan_part(const scan_t& part) {
@@ -97,9 +98,8 @@ void FrontendNode::publish(std::span<const ScanResult> scans, double millisecond
   for (const ScanResult& scan : scans) publish_scan(scan, milliseconds);
 }
 
-void FrontendNode::publish_state(const NavState& state, const Matrix15d* covariance) {
-  told_until_ = {lio_.session(), state.utime};
-  state_t message = messages::to_message(state, lio_.session(), "odom", covariance);
+void FrontendNode::publish_state(const NavState& state, std::int32_t session, const Matrix15d* covariance) {
+  state_t message = messages::to_message(state, session, "odom", covariance);
   message.sequence = state_sequence_++;
   link_.publish(channels::kState, message);
 }
@@ -110,15 +110,13 @@ void FrontendNode::publish_scan(const ScanResult& scan, double milliseconds) {
   stats.time_spent_ms = milliseconds;
   link_.publish(channels::kScanStats, stats);
   if (!scan.has_state) return;
-  // Stamps only increase. A scan that came after later inertial samples has corrected the state of the next one.
-  if (told_until_ < std::pair(lio_.session(), scan.state.utime)) {
-    publish_state(scan.state, &scan.covariance);
-  } else {
-    owed_covariance_ = scan.covariance;
+  const std::int32_t session = scan.stats.session;
+  if (order_.take_scan(session, scan.state.utime, scan.covariance)) {
+    publish_state(scan.state, session, &scan.covariance);
   }
   messages::PosedCloud cloud{.utime = scan.state.utime,
                              .sequence = cloud_sequence_++,
-                             .session = lio_.session(),
+                             .session = session,
                              .applied = scan.stats.applied(),
                              .T_odom_body = scan.state.T_odom_body,
                              .points = scan.cloud};
@@ -127,20 +125,19 @@ void FrontendNode::publish_scan(const ScanResult& scan, double milliseconds) {
 }
 
 void FrontendNode::publish_keyframe(const Keyframe& keyframe) {
-  for (const keyframe_t& part : messages::to_messages(keyframe)) link_.publish(channels::kKeyframe, part);
-  sent_keyframes_.push_back(keyframe);
-  if (std::ssize(sent_keyframes_) > CheckpointFolder::kKeyframes) sent_keyframes_.pop_front();
+  for (const keyframe_t& part : sent_keyframes_.add(keyframe)) link_.publish(channels::kKeyframe, part);
 }
 
 void FrontendNode::on_request(const keyframe_request_t& request) {
-  for (const Keyframe& keyframe : sent_keyframes_) {
-    if (keyframe.session != request.session || std::ranges::find(request.ids, keyframe.id) == request.ids.end())
-      continue;
+  const std::set<std::int32_t> wanted(request.ids.begin(), request.ids.end());
+  for (const std::int32_t id : wanted) {
+    const std::vector<keyframe_t>* parts = sent_keyframes_.find(request.session, id);
+    if (parts == nullptr) continue;
     if (!resends_.allow(std::chrono::steady_clock::now())) {
       ++request_counts_->rejected;
       return;
     }
-    for (const keyframe_t& part : messages::to_messages(keyframe)) link_.publish(channels::kKeyframe, part);
+    for (const keyframe_t& part : *parts) link_.publish(channels::kKeyframe, part);
   }
 }
 

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "checkpoint_folder.h"
 #include "frontend/lio.h"
@@ -16,6 +13,8 @@
 #include "messages/sensor_messages.h"
 #include "runtime/lcm_link.h"
 #include "runtime/rate_limit.h"
+#include "sent_keyframes.h"
+#include "state_order.h"
 
 namespace ignis {
 
@@ -33,7 +32,7 @@ class FrontendNode {
   void on_imu(const imu_t& message);
   void on_scan_part(const scan_t& part);
   void on_request(const keyframe_request_t& request);
-  void publish_state(const NavState& state, const Matrix15d* covariance);
+  void publish_state(const NavState& state, std::int32_t session, const Matrix15d* covariance);
   void publish_scan(const ScanResult& scan, double milliseconds);
   void publish_keyframe(const Keyframe& keyframe);
   void publish(std::span<const ScanResult> scans, double milliseconds);
@@ -49,14 +48,13 @@ class FrontendNode {
   runtime::ReceiverCounts* request_counts_ = nullptr;
   Lio lio_;
   messages::ScanAssembler assembler_;
-  std::deque<Keyframe> sent_keyframes_;  // ring for KEYFRAME_REQUEST
+  SentKeyframes sent_keyframes_{CheckpointFolder::kKeyframes};
   std::unique_ptr<CheckpointFolder> checkpoints_;
   std::string told_note_;            // Lio::start_note() as it was last printed
   Utime last_checkpoint_ = 0;        // [us] scan time
   RateLimit resends_{100.0, 100.0};  // keyframes a second; back end and map together ask for at most 85
   Utime newest_utime_ = 0;
-  std::pair<std::int32_t, Utime> told_until_{-1, 0};  // session and stamp of the newest LIO_STATE
-  std::optional<Matrix15d> owed_covariance_;          // of a scan that came late, for the next LIO_STATE
+  StateOrder order_;
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;
   std::int32_t cloud_sequence_ = 0;

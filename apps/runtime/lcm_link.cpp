@@ -42,6 +42,7 @@ LcmLink::LcmLink(const Application& application)
                 .pid = getpid(),
                 .version = version(),
                 .config_hash = application.config_hash},
+      alone_(application.name, application.config.lcm.url),
       lcm_(application.config.lcm.url),
       address_(BusAddress::parse(application.config.lcm.url)),
       budget_(application.config.health.limits_of(application.name)),
@@ -141,7 +142,8 @@ std::string LcmLink::own_trouble() const {
 
 std::int8_t LcmLink::own_state() const {
   const auto taken = [this](const Receiver& receiver) { return receiver.refusals.is_taken_by_another(uptime_s()); };
-  return std::ranges::any_of(receivers_, taken) ? health_t::FAULT : health_t::DEGRADED;
+  const bool fault = peers_.needs_person(uptime_s()) || std::ranges::any_of(receivers_, taken);
+  return fault ? health_t::FAULT : health_t::DEGRADED;
 }
 
 void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets) {

@@ -15,6 +15,7 @@
 #include "runtime/application.h"
 #include "runtime/budget_watch.h"
 #include "runtime/bus_socket.h"
+#include "runtime/instance_lock.h"
 #include "runtime/peer_watch.h"
 #include "runtime/refusals.h"
 #include "runtime/sequence_tracker.h"
@@ -39,7 +40,7 @@ enum class Senders : std::uint8_t { kOne, kSeveral };
 /// any thread.
 class LcmLink {
  public:
-  /// Opens the bus. Throws UserError that says what to do (no multicast route, bad URL).
+  /// Opens the bus. Throws UserError that says what to do (no multicast route, bad URL, a second instance).
   explicit LcmLink(const Application& application);
 
   template <class Message>
@@ -76,8 +77,8 @@ class LcmLink {
 
   /// Publishes HEALTH when a second has passed, at once when `state` changed, and for a new text every 200 ms.
   /// `utime`: newest measurement seen [us]. `state`: one of health_t's constants; OK becomes DEGRADED, with the reason,
-  /// when this process exceeds its limits or disagrees with others on the bus about configuration or version. Call it
-  /// at every turn of the main loop: the supervisor hears of readiness and progress here.
+  /// when this process exceeds its limits, and FAULT when the processes on the bus do not belong together (PeerWatch).
+  /// Call it at every turn of the main loop: the supervisor hears of readiness and progress here.
   void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
 
   [[nodiscard]] std::int64_t failed_sends() const { return failed_sends_; }
@@ -104,6 +105,7 @@ class LcmLink {
   [[nodiscard]] double uptime_s() const;
 
   PeerIdentity identity_;
+  InstanceLock alone_;
   lcm::LCM lcm_;
   std::deque<Receiver> receivers_;  // a deque keeps addresses stable
   std::optional<BusAddress> address_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/peer_watch.h"
 
+#include <algorithm>
 #include <format>
 
 namespace ignis::runtime {
@@ -22,6 +23,16 @@ void PeerWatch::observe(const PeerIdentity& peer, double now_s) {
                 .config_hash = peer.config_hash.substr(0, kMaxTextLength)};
   heard.last_s = now_s;
   ++heard.messages;
+  note_start(key.first, peer.pid, now_s);
+}
+
+void PeerWatch::note_start(const std::string& process, std::int32_t pid, double now_s) {
+  std::erase_if(starts_, [&](const auto& entry) { return now_s - entry.second.back().heard_s > kCrashLoopSeconds; });
+  if (starts_.size() >= kMaxPeers && !starts_.contains(process)) return;
+  std::deque<Start>& starts = starts_[process];
+  if (std::ranges::contains(starts, pid, &Start::pid)) return;
+  starts.push_back({pid, now_s});
+  if (starts.size() > kCrashLoopStarts) starts.pop_front();
 }
 
 std::string PeerWatch::disagreement(const Heard& heard) const {
@@ -29,11 +40,12 @@ std::string PeerWatch::disagreement(const Heard& heard) const {
   if (peer.process == self_.process && heard.messages >= kInstanceMessages) {
     return std::format("a second {} is on the bus (process {})", peer.process, peer.pid);
   }
-  if (peer.config_hash != self_.config_hash) {
+  // Whoever says nothing about itself, such as a tool, contradicts nobody.
+  if (!peer.config_hash.empty() && peer.config_hash != self_.config_hash) {
     return std::format("configuration differs from that of {} (ours {}, its {})", peer.process, self_.config_hash,
                        peer.config_hash);
   }
-  if (peer.version != self_.version) {
+  if (!peer.version.empty() && peer.version != self_.version) {
     return std::format("version {} differs from {} of {}", self_.version, peer.version, peer.process);
   }
   return {};
@@ -41,12 +53,17 @@ std::string PeerWatch::disagreement(const Heard& heard) const {
 
 std::string PeerWatch::trouble(double now_s) const {
   std::string text;
-  for (const auto& [key, heard] : peers_) {
-    if (now_s - heard.last_s > kForgetAfter_s) continue;
-    const std::string one = disagreement(heard);
-    if (one.empty()) continue;
-    if (!text.empty()) text += "; ";
+  const auto add = [&text](const std::string& one) {
+    if (!text.empty() && !one.empty()) text += "; ";
     text += one;
+  };
+  for (const auto& [key, heard] : peers_) {
+    if (now_s - heard.last_s <= kForgetAfter_s) add(disagreement(heard));
+  }
+  for (const auto& [process, starts] : starts_) {
+    if (starts.size() == kCrashLoopStarts && now_s - starts.front().heard_s <= kCrashLoopSeconds) {
+      add(std::format("{} was started {} times within {:.0f} s", process, starts.size(), kCrashLoopSeconds));
+    }
   }
   return text;
 }

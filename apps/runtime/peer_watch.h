@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 #include <utility>
@@ -19,14 +20,18 @@ struct PeerIdentity {
   bool operator==(const PeerIdentity&) const = default;
 };
 
-/// Compares this process with the others on the bus: all must run the same version with the same configuration, and
-/// each executable once. Values in, values out: time comes with the calls.
+/// Compares this process with the others on the bus: all must run the same version with the same configuration, each
+/// executable once, and none may end and be started again and again. Values in, values out: time comes with the calls.
 class PeerWatch {
  public:
   /// [s] without a word after which another process counts as gone; HEALTH comes every second.
   static constexpr double kForgetAfter_s = 3.0;
   /// HEALTH messages of a second instance before it is believed: a killed process's last one may still be on its way.
   static constexpr int kInstanceMessages = 3;
+
+  /// A process of which so many instances were heard within this time ends again and again.
+  static constexpr std::size_t kCrashLoopStarts = 5;
+  static constexpr double kCrashLoopSeconds = 60.0;
 
   /// Processes remembered at most: names and numbers come from the bus.
   static constexpr std::size_t kMaxPeers = 32;
@@ -39,16 +44,25 @@ class PeerWatch {
   /// What disagrees among those heard lately, in words; empty when all agree.
   [[nodiscard]] std::string trouble(double now_s) const;
 
+  /// Whether anything of that needs a person: every disagreement does, since no process can mend it.
+  [[nodiscard]] bool needs_person(double now_s) const { return !trouble(now_s).empty(); }
+
  private:
   struct Heard {
     PeerIdentity peer;
     double last_s = 0.0;
     int messages = 0;
   };
+  struct Start {
+    std::int32_t pid = 0;
+    double heard_s = 0.0;
+  };
   [[nodiscard]] std::string disagreement(const Heard& heard) const;
+  void note_start(const std::string& process, std::int32_t pid, double now_s);
 
   PeerIdentity self_;
   std::map<std::pair<std::string, std::int32_t>, Heard> peers_;
+  std::map<std::string, std::deque<Start>> starts_;  // the newest instances of each, by the first word of each
 };
 
 }  // namespace ignis::runtime

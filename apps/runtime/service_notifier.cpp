@@ -32,6 +32,8 @@ ServiceNotifier::ServiceNotifier() {
   }
 }
 
+bool ServiceNotifier::is_supervised() { return std::getenv("NOTIFY_SOCKET") != nullptr || readiness_descriptor() >= 0; }
+
 void ServiceNotifier::turn(std::int64_t progress, double now_s) {
   if (!ready_) say_ready();
   if (watchdog_period_s_ <= 0.0 || progress == fed_with_ || now_s - last_fed_s_ < watchdog_period_s_) return;

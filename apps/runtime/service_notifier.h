@@ -14,6 +14,10 @@ class ServiceNotifier {
  public:
   ServiceNotifier();
 
+  /// Whether a supervisor started this process: it can tell over the bus what is wrong, instead of ending with a
+  /// message that nobody reads and being started again.
+  [[nodiscard]] static bool is_supervised();
+
   /// Call at every turn of the main loop. `progress`: what has been handled since start; `now_s` [s of any steady
   /// clock]. The first call says READY. The watchdog is fed only when `progress` has grown since it was fed last: a
   /// loop that hangs in a handler starves it, and so does one that turns without handling anything.

@@ -21,6 +21,19 @@ TARGET = "ignis-lio.target"
 _READY_FD = 3
 _LOG_BYTES = 1_000_000
 _LOG_FILES = 5
+# A process that ends again and again is started later and later. The first three times cost a drive nothing; s6 itself
+# waits a second when a process has lived for less.
+_PAUSE = r"""deaths=0
+now=$(date +%s)
+for stamp in $(s6-svdt . | cut -c2-17); do
+  # TAI64: seconds since 1970 plus 2^62 plus 10.
+  [ $((now - (0x$stamp - 0x400000000000000a))) -ge 60 ] || deaths=$((deaths + 1))
+done
+case $deaths in 0 | 1 | 2 | 3) pause=0 ;; 4) pause=2 ;; 5) pause=5 ;; *) pause=10 ;; esac
+if [ $pause -gt 0 ]; then
+  echo "ended $deaths times within a minute, at last with $(s6-svdt . | tail -n 1 | cut -c27-); next start in $pause s"
+  sleep $pause
+fi"""
 
 
 class Supervisor(Protocol):
@@ -33,7 +46,7 @@ class Supervisor(Protocol):
         """Whether it supervises our processes now."""
 
     def start(self, seconds: float) -> list[str]:
-        """Starts all; the names of those not ready in time."""
+        """Starts all; those not ready in time, with what is known about why."""
 
     def stop(self) -> None:
         """Stops all and waits for them."""
@@ -138,7 +151,8 @@ class S6Supervisor:
                 start_new_session=True,
             )
         deadline = time.monotonic() + seconds
-        return [name for name in self.commands if not self._wait_ready(name, deadline - time.monotonic())]
+        late = [name for name in self.commands if not self._wait_ready(name, deadline - time.monotonic())]
+        return [f"{name}{self._why_late(name)}" for name in late]
 
     def stop(self) -> None:
         """Stops the services in the order of the data, then s6 itself."""
@@ -163,6 +177,18 @@ class S6Supervisor:
                 return False
             time.sleep(0.1)
 
+    def _why_late(self, name: str) -> str:
+        """How often the process has ended, and its last words; empty when it still runs."""
+        shown = subprocess.run(["s6-svdt", str(self.scan / name)], capture_output=True, text=True, check=False)
+        deaths = [line.split(" ", 1)[1] for line in shown.stdout.splitlines()]
+        if not deaths:
+            return ""
+        log = self.state / "log" / name / "current"
+        lines = log.read_text(errors="replace").splitlines() if log.exists() else []
+        # What the supervisor adds to the log is known already.
+        said = [line.partition("  ")[2] for line in lines if " times within a minute" not in line]
+        return f" (ended {len(deaths)} times, at last with {deaths[-1]}: {said[-1] if said else 'without a word'})"
+
     def _write_service(self, name: str, command: list[str]) -> None:
         folder = self.scan / name
         (folder / "log").mkdir(parents=True)
@@ -170,7 +196,7 @@ class S6Supervisor:
         (self.state / "journal").mkdir(exist_ok=True)
         words = shlex.join(command)
         (folder / "notification-fd").write_text(f"{_READY_FD}\n")
-        _write_script(folder / "run", f"exec 2>&1\nIGNIS_READY_FD={_READY_FD} exec {words}")
+        _write_script(folder / "run", f"exec 2>&1\n{_PAUSE}\nIGNIS_READY_FD={_READY_FD} exec {words}")
         log = shlex.quote(str(self.state / "log" / name))
         _write_script(folder / "log" / "run", f"exec s6-log -b T n{_LOG_FILES} s{_LOG_BYTES} {log}")
 

@@ -20,8 +20,8 @@ struct NavState {
   Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();  ///< [rad/s] body axes, bias removed
   Eigen::Vector2d gravity_tilt = Eigen::Vector2d::Zero();  ///< x and z of the unit vector along gravity, odom axes
 
-  /// Unit vector along gravity, odom axes: straight down, -Y, as far as frame odom began level. It never comes up to the
-  /// horizon, whatever the tilt.
+  /// Unit vector along gravity, odom axes: straight down, -Y, as far as frame odom began level. It never comes up to
+  /// the horizon, whatever the tilt.
   [[nodiscard]] Eigen::Vector3d gravity_direction() const {
     return {gravity_tilt.x(), -std::sqrt(std::max(1.0 - gravity_tilt.squaredNorm(), 0.01)), gravity_tilt.y()};
   }

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxPendingScans = 40;               // two seconds of L1 scans without IMU
 constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a scan but a broken stamp
+constexpr std::int64_t kMinScanPeriodUs = 8'000;           // of scans that are worth the time that matching takes
 constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
 constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
@@ -76,8 +77,10 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   ImuResult result;
   if (resumed_from_) close_gap(sample.utime);
   if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
+  const std::optional<Utime> before = imu_.empty() ? std::nullopt : std::optional(imu_.newest());
   result.fault = imu_.add(sample);
   if (result.fault != ImuFault::kNone) return result;
+  if (before && bridge_silence(*before, sample.utime) == Bridge::kTooLong) return result;
   trust_.note_imu(sample.utime);
   if (sample.saturated) last_clipped_ = sample.utime;
 
@@ -124,6 +127,10 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
     results.push_back(refuse(scan, ScanReason::kBadStamp));
     return results;
   }
+  if (comes_too_soon(scan)) {
+    results.push_back(refuse(scan, ScanReason::kTooOften));
+    return results;
+  }
   last_scan_end_ = scan.end_utime();
   trust_.note_arrival(scan.end_utime());
   pending_.push_back(std::move(scan));
@@ -161,6 +168,13 @@ ScanResult Lio::refuse(const Scan& scan, ScanReason reason) const {
   result.stats.T_odom_body = filter_.nominal.T_odom_body;
   result.stats.map_points = map_.size();
   return result;
+}
+
+/// Scans of one sensor follow one another. More of them would cost time and say what the last one said.
+bool Lio::comes_too_soon(const Scan& scan) const {
+  if (!last_scan_end_) return false;
+  const bool overlaps = scan.utime < *last_scan_end_ - scan.duration_us / 2;
+  return overlaps || scan.end_utime() - *last_scan_end_ < kMinScanPeriodUs;
 }
 
 std::vector<CloudPoint> Lio::register_points(const Scan& scan) {

@@ -88,6 +88,7 @@ class Lio {
   [[nodiscard]] std::vector<ScanResult> process_pending();
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
+  [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
                                     double age);
   void count_correction(const MatchResult& match, double age);
@@ -105,6 +106,8 @@ class Lio {
   void start(const FilterState& first);
   void give_up_resumption();
   void close_gap(Utime first_sample);
+  enum class Bridge : std::int8_t { kNone, kBridged, kTooLong };
+  Bridge bridge_silence(Utime before, Utime sample);
   void seek_confirmation(ScanReason reason);
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // How a front end goes on where its killed predecessor was (see Lio::resume): the gap is closed by the first samples,
-// and scans have to confirm the pose before anything is built on it.
+// and scans have to confirm the pose before anything is built on it. A driver that hung leaves the same gap.
+#include <algorithm>
 #include <format>
 
+#include "common/so3.h"
 #include "frontend/lio.h"
 
 namespace ignis {
@@ -11,6 +13,28 @@ namespace {
 
 constexpr double kConfirmationSeconds = 2.0;     // that a resumption has
 constexpr int kContradictionsOfAWrongPlace = 3;  // in a row; single ones come in any curve
+constexpr double kSilenceSeconds = 0.3;          // of inertial samples and scans, that two samples cannot stand for
+constexpr double kUnknownAccel = 1.0;            // [m/s^2] sigma of what a vehicle may do meanwhile
+constexpr double kUnknownTurn = 0.1;             // [rad/s] sigma
+
+/// Speed and turn rate go on, in body axes; what the vehicle did beside is unknown.
+void go_on_blindly(FilterState& filter, double seconds) {
+  NavState& state = filter.nominal;
+  const Eigen::Quaterniond turn = so3::exp(state.angular_rate * seconds);
+  const Eigen::Vector3d v_body = state.T_odom_body.rotation.conjugate() * state.v_odom;
+  const Eigen::Vector3d v_before = state.v_odom;
+  state.T_odom_body.rotation = (state.T_odom_body.rotation * turn).normalized();
+  state.v_odom = state.T_odom_body.rotation * v_body;
+  state.T_odom_body.translation += 0.5 * seconds * (v_before + state.v_odom);
+  state.utime += to_micros(seconds);
+  const double shift = 0.5 * kUnknownAccel * seconds * seconds;
+  ErrorCovariance transition = ErrorCovariance::Identity();
+  transition.block<3, 3>(kPosition, kVelocity) = seconds * Eigen::Matrix3d::Identity();
+  filter.covariance = transition * filter.covariance * transition.transpose();
+  filter.covariance.diagonal().segment<3>(kAttitude).array() += kUnknownTurn * seconds * kUnknownTurn * seconds;
+  filter.covariance.diagonal().segment<3>(kPosition).array() += shift * shift;
+  filter.covariance.diagonal().segment<3>(kVelocity).array() += kUnknownAccel * seconds * kUnknownAccel * seconds;
+}
 
 }  // namespace
 
@@ -20,6 +44,32 @@ void Lio::resume() {
   scans_without_correction_ = kScansUntilReacquisition;
   trust_.note_resumption();
   start_note_ = std::format("going on with session {}", session_);
+}
+
+/// Neither stream said anything since `before`: not two samples for all that were missed, but scans have to tell where
+/// the vehicle is, as after a restart. Over too long a time nothing is left to go on from.
+Lio::Bridge Lio::bridge_silence(Utime before, Utime sample) {
+  const double silence = seconds_between(last_scan_end_ ? std::max(before, *last_scan_end_) : before, sample);
+  if (!running_ || !velocity_known_ || !pending_.empty() || silence < kSilenceSeconds) return Bridge::kNone;
+  if (silence > config_.resume_max_gap_s) {
+    reset();
+    start_note_ = std::format("new session: neither IMU data nor scans came for {:.1f} s (limit {:.1f})", silence,
+                              config_.resume_max_gap_s);
+    return Bridge::kTooLong;
+  }
+  advance_to(before);
+  const double blind = seconds_between(filter_.nominal.utime, sample);
+  FilterState cautious{filter_.nominal, cautious_};
+  go_on_blindly(cautious, blind);
+  cautious_ = cautious.covariance;
+  go_on_blindly(filter_, blind);
+  live_ = filter_.nominal;
+  keyframer_.note_gap();
+  unaided_ = filter_;
+  confirm_until_ = sample + to_micros(kConfirmationSeconds);
+  scans_without_correction_ = kScansUntilReacquisition;
+  trust_.note_resumption();
+  return Bridge::kBridged;
 }
 
 bool Lio::can_be_resumed() const { return running_ && velocity_known_ && !trust_.awaits_confirmation(); }
@@ -66,7 +116,7 @@ void Lio::give_up_resumption() {
   cautious_ = unaided_->covariance;
   unaided_.reset();
   begin_new_map();
-  start_note_ = "new session: scans did not confirm the pose of the checkpoint";
+  start_note_ = "new session: scans did not confirm the pose after a gap";
 }
 
 }  // namespace ignis

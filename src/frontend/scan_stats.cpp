@@ -31,6 +31,8 @@ std::string_view text(ScanReason reason) {
       return "no IMU data cover the scan";
     case ScanReason::kNumericalFailure:
       return "numerical failure";
+    case ScanReason::kTooOften:
+      return "overlaps the scan before it, or came too soon after it";
   }
   return "unknown reason";
 }

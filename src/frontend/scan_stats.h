@@ -27,6 +27,7 @@ enum class ScanReason : std::int8_t {
   kBadStamp = 10,
   kNoImu = 11,
   kNumericalFailure = 12,
+  kTooOften = 13,
 };
 
 /// The reason in words.

@@ -42,11 +42,16 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
     ++scans_since_applied_;
     return;
   }
+  if (is_out_of_sight()) {
+    unseen_ = true;
+    scans_to_confirm_ = kScansToConfirm;
+  }
   last_applied_ = stats.utime;
   scans_since_applied_ = 0;
   scans_to_confirm_ = std::max(scans_to_confirm_ - 1, 0);
   if (scans_to_confirm_ > 0) return;
   lost_ = false;
+  unseen_ = false;
   // What closed the gap says nothing about how scans and IMU agree.
   if (resumed_) corrections_.clear();
   resumed_ = false;
@@ -80,6 +85,10 @@ double TrustMonitor::seconds_without_scan() const {
   return last_applied_ && newest_scan_ ? seconds_between(*last_applied_, *newest_scan_) : 0.0;
 }
 
+bool TrustMonitor::is_out_of_sight() const {
+  return scans_since_applied_ >= kScansUntilDegraded && seconds_without_scan() > kSecondsUntilLost;
+}
+
 double TrustMonitor::disagreement() const {
   if (corrections_.size() < 2) return 0.0;
   const double seconds = seconds_between(corrections_.front().utime, corrections_.back().utime);
@@ -93,8 +102,7 @@ double TrustMonitor::disagreement() const {
 }
 
 Trust TrustMonitor::trust() const {
-  if (lost_ || position_sigma_ > config_.lost_sigma_m) return Trust::kLost;
-  if (scans_since_applied_ >= kScansUntilDegraded && seconds_without_scan() > kSecondsUntilLost) return Trust::kLost;
+  if (lost_ || unseen_ || position_sigma_ > config_.lost_sigma_m || is_out_of_sight()) return Trust::kLost;
   if (scans_since_applied_ >= kScansUntilDegraded || position_sigma_ > config_.degraded_sigma_m ||
       seconds_without_imu() > kSilentImuSeconds || scans_to_confirm_ > 0 || disagreement() > kMaxDisagreement) {
     return Trust::kDegraded;
@@ -111,13 +119,19 @@ std::string TrustMonitor::reason() const {
                        config_.degraded_sigma_m);
   }
   if (scans_since_applied_ >= kScansUntilDegraded) return std::format("no scan applied: {}", last_reason_);
+  if (unseen_) {
+    return std::format("lost: no scan had fitted for {:.0f} s ({} applied scans to go)", kSecondsUntilLost,
+                       scans_to_confirm_);
+  }
   if (seconds_without_imu() > kSilentImuSeconds) {
     return std::format("no IMU data for {:.1f} s, going on with scans alone", seconds_without_imu());
   }
   if (disagreement() <= kMaxDisagreement && uncertain_start_) {
     return std::format("new session after a restart, {} applied scans to go", scans_to_confirm_);
   }
-  if (resumed_) return std::format("resumed after a restart, {} applied scans to go", scans_to_confirm_);
+  if (resumed_)
+    return std::format("resumed after a restart or a silence of both streams, {} applied scans to go",
+                       scans_to_confirm_);
   if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
   if (disagreement() > kMaxDisagreement) {
     return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),

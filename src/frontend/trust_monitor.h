@@ -64,6 +64,7 @@ class TrustMonitor {
 
   [[nodiscard]] double seconds_without_imu() const;
   [[nodiscard]] double seconds_without_scan() const;
+  [[nodiscard]] bool is_out_of_sight() const;
 
   FrontendConfig config_;
   std::optional<Utime> newest_imu_;
@@ -73,6 +74,7 @@ class TrustMonitor {
   int scans_since_applied_ = 0;
   int scans_to_confirm_ = 0;  ///< that have to be applied before the trust comes back
   bool lost_ = false;
+  bool unseen_ = false;   ///< no scan has fitted for so long that one alone does not prove the place
   bool resumed_ = false;  ///< from a checkpoint, and not yet confirmed
   bool uncertain_start_ = false;
   int losses_ = 0;
@@ -93,6 +95,7 @@ class TrustMonitor {
     io.number(monitor.scans_since_applied_);
     io.number(monitor.scans_to_confirm_);
     io.number(monitor.lost_);
+    io.number(monitor.unseen_);
     io.number(monitor.uncertain_start_);
     io.number(monitor.losses_);
     io.number(monitor.position_sigma_);

@@ -55,6 +55,23 @@ keyframe_t plain_fields(const Keyframe& keyframe) {
   return message;
 }
 
+/// Exactly as much room as a part needs: whoever sends keyframes again keeps many of them.
+void reserve_slices(std::size_t imu, std::size_t points, keyframe_t& message) {
+  message.imu_dt_us.reserve(imu);
+  for (auto* values :
+       {&message.gyro_x, &message.gyro_y, &message.gyro_z, &message.accel_x, &message.accel_y, &message.accel_z}) {
+    values->reserve(imu);
+  }
+  for (auto* values : {&message.x, &message.y, &message.z}) values->reserve(points);
+  message.intensity.reserve(points);
+}
+
+/// How many of `items` belong to part i.
+std::size_t slice_of(std::size_t items, std::int64_t per_part, std::size_t i) {
+  const std::size_t begin = std::min(items, i * static_cast<std::size_t>(per_part));
+  return std::min(items - begin, static_cast<std::size_t>(per_part));
+}
+
 void append_imu(const ImuSample& sample, keyframe_t& message) {
   ++message.num_imu;
   message.imu_dt_us.push_back(static_cast<std::int32_t>(sample.utime - message.previous_utime));
@@ -108,6 +125,8 @@ std::vector<keyframe_t> to_messages(const Keyframe& keyframe) {
   for (std::size_t i = 0; i < parts.size(); ++i) {
     parts[i].part = static_cast<std::int16_t>(i);
     parts[i].part_count = static_cast<std::int16_t>(part_count);
+    reserve_slices(slice_of(keyframe.imu.size(), kMaxImuPerPart, i),
+                   slice_of(keyframe.cloud.size(), kMaxCloudPerPart, i), parts[i]);
   }
   for (std::size_t i = 0; i < keyframe.imu.size(); ++i) append_imu(keyframe.imu[i], parts[i / kMaxImuPerPart]);
   for (std::size_t i = 0; i < keyframe.cloud.size(); ++i) append_point(keyframe.cloud[i], parts[i / kMaxCloudPerPart]);

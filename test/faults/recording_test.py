@@ -1,20 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Row L1 for the recorder: its disk fills in mid-drive, by its own log or at once by somebody else."""
+"""Rows L1 and P6 for the recorder: its disk fills in mid-drive, or its logger is killed; it goes on in a new file."""
 
+from __future__ import annotations
+
+import os
+import shutil
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import lcm
 import pytest
+from ignis_lcm.ignis import health_t
 
 from fault_drive import BUS, CONFIG
+from ignis.bus import Listener
+from ignis.log_config import recorded_config
 from ignis.logs import read_events
 
-DISK_MB = 12
+DISK_MB = 7
 KEEP_MB = 4
+BUSY_S = 1.5  # that a busy machine may add
 MESSAGE = bytes(20_000)
 STRANGER_MB = 20  # more than there is
 
@@ -38,30 +46,92 @@ def fill(disk: Path) -> None:
             return
 
 
+class Recorder:
+    """`./ignis record` on our bus, and what it is told to record. A context manager: leaving it ends all."""
+
+    def __init__(self, log: Path, *arguments: object) -> None:
+        command = [sys.executable, "-m", "ignis.record", "-o", log, "--config", CONFIG, "--lcm-url", BUS, *arguments]
+        self.log = log
+        self.process = subprocess.Popen(
+            list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        self.listener = Listener(BUS, "HEALTH")
+        self.sent = 0
+        self.started = False
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            self.process.communicate(timeout=20)
+
+    def send_until(self, holds: Callable[[], bool], seconds: float = 30.0) -> float:
+        """Publishes numbered messages until it holds; how long that took [s]."""
+        began = time.monotonic()
+        while not holds():
+            assert self.process.poll() is None and time.monotonic() - began < seconds
+            self.listener.bus.publish("DRIVE", self.sent.to_bytes(4, "big") + MESSAGE)
+            self.started = self.started or self.log.exists()
+            self.sent += self.started
+            self.listener.listen(0.01)
+        return time.monotonic() - began
+
+    def says(self, state: int) -> bool:
+        """Whether its newest HEALTH is of this state."""
+        entry = self.listener.health.get(("ignis_record", self.process.pid))
+        return entry is not None and entry[1].state == state
+
+    def end(self) -> tuple[int, str]:
+        """Ctrl-C; exit code and all that was said."""
+        self.process.send_signal(signal.SIGINT)
+        said, trouble = self.process.communicate(timeout=20)
+        print(said[-600:], trouble[-600:])
+        return self.process.returncode, said + trouble
+
+
+def numbers(log: Path) -> list[int]:
+    """What of our messages stands in a log."""
+    found = [int.from_bytes(event.data[:4], "big") for event in read_events(log) if event.channel == "DRIVE"]
+    assert found == sorted(found)
+    return found
+
+
 @pytest.mark.parametrize("filled_by", ["its own log", "somebody else"])
-def test_fault_l1_a_recorder_whose_disk_fills_says_so_and_its_log_stays_readable(
-    filled_by: str, small_disk: Path
+def test_fault_l1_a_recorder_whose_disk_fills_says_so_and_goes_on_in_a_new_file_when_there_is_room(
+    filled_by: str, small_disk: Path, tmp_path: Path
 ) -> None:
-    log = small_disk / "drive.lcmlog"
-    command = [sys.executable, "-m", "ignis.record", "-o", log, "--config", CONFIG, "--lcm-url", BUS]
-    recorder = subprocess.Popen(
-        [*command, "--keep-free-mb", str(KEEP_MB)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    bus = lcm.LCM(BUS)
-    began, sent, full = time.monotonic(), 0, False
-    while recorder.poll() is None and time.monotonic() - began < 60.0:
-        if filled_by == "its own log" or sent < 50:
-            bus.publish("DRIVE", sent.to_bytes(4, "big") + MESSAGE)
-            sent += log.exists()
-        elif not full:
-            time.sleep(1.0)
+    log, second = small_disk / "drive.lcmlog", small_disk / "drive-2.lcmlog"
+    with Recorder(log, "--keep-free-mb", KEEP_MB) as recorder:
+        if filled_by == "somebody else":
+            recorder.send_until(lambda: log.exists() and log.stat().st_size > 400_000)
             fill(small_disk)
-            full = True
-        time.sleep(0.02)
-    recorder.terminate()
-    said, trouble = recorder.communicate(timeout=20)
-    print(said[-600:], trouble[-600:])
-    assert f"the disk has less than {KEEP_MB} MB left" in said
-    numbers = [int.from_bytes(event.data[:4], "big") for event in read_events(log) if event.channel == "DRIVE"]
-    assert len(numbers) > 20 and numbers == sorted(numbers)
+        recorder.send_until(lambda: recorder.says(health_t.FAULT))
+        first = tmp_path / "kept.lcmlog"
+        shutil.copy(log, first)
+        (small_disk / "stranger" if filled_by == "somebody else" else log).unlink()
+        recorder.send_until(lambda: second.exists() and second.stat().st_size > 400_000)
+        assert recorder.says(health_t.OK)
+        code, said = recorder.end()
+    assert code == 3 and f"the disk has less than {KEEP_MB} MB left: paused" in said and str(second) in said
+    early, late = numbers(first), numbers(second)
+    assert len(early) > 10 and len(late) > 10 and early[-1] < late[0], "what was written is whole, and it went on"
     assert not list(small_disk.glob("*.tmp"))
+
+
+def test_fault_p6_a_killed_logger_is_succeeded_within_a_second_in_a_new_file(
+    private_network: None, tmp_path: Path
+) -> None:
+    log, second = tmp_path / "drive.lcmlog", tmp_path / "drive-2.lcmlog"
+    with Recorder(log) as recorder:
+        recorder.send_until(lambda: log.exists() and recorder.sent > 250)  # a logger that dies at once is a refusal
+        (logger,) = Path(f"/proc/{recorder.process.pid}/task/{recorder.process.pid}/children").read_text().split()
+        os.kill(int(logger), signal.SIGKILL)
+        took = recorder.send_until(second.exists)
+        recorder.send_until(lambda: second.stat().st_size > 1_500_000)
+        code, said = recorder.end()
+    assert took < 1.0 + BUSY_S
+    assert code == 3 and "interrupted: lcm-logger ended with code -9" in said
+    assert recorded_config(log) is not None and recorded_config(second) is not None
+    assert len(numbers(log)) > 100 and len(numbers(second)) > 10

@@ -4,6 +4,9 @@
 Not part of the test run; called by hand:
 
     ./ignis shell python3 test/faults/soak.py --seconds 3600 --out results/soak
+    ./ignis shell python3 test/faults/soak.py --seconds 3600 --speed 5 --out results/soak
+
+With --speed the sensor is a lap that is played again and again, without the driver; seconds are those of the sensor.
 
 Writes soak.csv, soak.json and soak.png. Exits with 1 when a keyframe was lost, a process died, descriptors or threads
 grew, or latency went beyond its limit.
@@ -29,8 +32,9 @@ for folder in (HERE, HERE.parent / "system", HERE.parent / "map"):
     sys.path.insert(0, str(folder))
 
 from l1_endurance import long_scene  # noqa: E402
+from lap_player import LapPlayer, simulate_laps  # noqa: E402
 
-from fault_drive import BUS, CONFIG, PORT  # noqa: E402
+from fault_drive import BUS, CONFIG, PORT, SCENE  # noqa: E402
 from ignis.bus import Listener  # noqa: E402
 from ignis.pipeline import Pipeline, enter_private_network  # noqa: E402
 from stream_server import Server  # noqa: E402
@@ -92,7 +96,35 @@ def used_by(pid: int) -> tuple[int, int]:
     return len(list(Path(f"/proc/{pid}/fd").iterdir())), len(list(Path(f"/proc/{pid}/task").iterdir()))
 
 
-def drive(folder: Path, seconds: float, viewers: int) -> tuple[list[Sample], dict[str, Any]]:
+class LiveSensor:
+    """The simulated sensor on its line, and the driver: in real time."""
+
+    def __init__(self, pipeline: Pipeline, folder: Path, seconds: float) -> None:
+        port, common = folder / "l1.pty", ("--config", CONFIG)
+        scene = long_scene(folder)
+        pipeline.start("l1_sim", "--scene", scene, *common, "--pty", port, "--wait", 60, "--duration", seconds + 30)
+        pipeline.wait_for_text("l1_sim", "waiting", 60.0)
+        pipeline.start("l1_driver", *common, "--port", port)
+        self._began = time.monotonic()
+
+    @property
+    def played_s(self) -> float:
+        return time.monotonic() - self._began
+
+    def end(self) -> None:
+        """Ends with the pipeline."""
+
+
+def start_sensor(pipeline: Pipeline, folder: Path, seconds: float, speed: float) -> LiveSensor | LapPlayer:
+    """What the processes get their measurements from."""
+    if speed == 1.0:
+        return LiveSensor(pipeline, folder, seconds)
+    player = LapPlayer(simulate_laps(SCENE, CONFIG, folder, BUS), BUS, speed)
+    player.start()
+    return player
+
+
+def drive(folder: Path, seconds: float, viewers: int, speed: float) -> tuple[list[Sample], dict[str, Any]]:
     """One soak; returns the samples and what was counted."""
     samples: list[Sample] = []
     ids: set[int] = set()
@@ -102,20 +134,15 @@ def drive(folder: Path, seconds: float, viewers: int) -> tuple[list[Sample], dic
             ids.add(message.id)
 
     listener = Listener(BUS, "HEALTH|LIO_KEYFRAME|SMOOTHED_KEYFRAMES|MAP_STATUS", note)
-    port = folder / "l1.pty"
     with Pipeline(folder, BUS) as pipeline:
         common = ("--config", CONFIG)
         pipeline.start("map_builder", *common, "--port", PORT)
         pipeline.wait_for_text("map_builder", "http://", 20.0)
         pipeline.start("graph_backend", *common, "--journal", folder / "journal")
         pipeline.start("lio_frontend", *common)
-        scene = long_scene(folder)
-        pipeline.start("l1_sim", "--scene", scene, *common, "--pty", port, "--wait", 60, "--duration", seconds + 30)
-        pipeline.wait_for_text("l1_sim", "waiting", 60.0)
-        pipeline.start("l1_driver", *common, "--port", port)
+        sensor = start_sensor(pipeline, folder, seconds, speed)
         watching = [Viewer(ViewAddress(PORT)) for _ in range(viewers)]
-        began = time.monotonic()
-        while (passed := time.monotonic() - began) < seconds:
+        while (passed := sensor.played_s) < seconds:
             listener.listen(2.0)
             pipeline.check()
             for (name, pid), (_, health) in listener.health.items():
@@ -126,6 +153,7 @@ def drive(folder: Path, seconds: float, viewers: int) -> tuple[list[Sample], dic
                         descriptors, threads, len(ids), health.state,
                     )
                 )  # fmt: skip
+        sensor.end()
         listener.listen(5.0)
         newest = {name: listener.channels[name].newest for name in ("SMOOTHED_KEYFRAMES", "MAP_STATUS")}
         journal = sum(file.stat().st_size for file in (folder / "journal").iterdir())
@@ -158,12 +186,15 @@ def judged(samples: list[Sample], figures: dict[str, Any]) -> list[str]:
         troubles.append("the graph lost keyframes")
     for name in PROCESSES:
         own = [sample for sample in samples if sample.process == name and sample.seconds > SETTLED_S]
+        if not own:
+            continue
         seconds = np.array([sample.seconds for sample in own])
         memory = np.array([sample.memory_mb for sample in own])
         half = len(own) // 2
         latency = [sample.latency_ms for sample in own]
         figures[name] = {
             "memory_mb": [round(float(memory[0]), 1), round(float(memory[-1]), 1)],
+            "memory_mb_of_quarters": [round(float(np.median(part)), 1) for part in np.array_split(memory, 4)],
             "memory_mb_per_hour": round(float(3600 * np.polyfit(seconds, memory, 1)[0]), 1),
             "latency_ms_median_of_halves": [
                 round(float(np.median(part)), 2) for part in (latency[:half], latency[half:])
@@ -207,6 +238,7 @@ def main() -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=600.0, help="length of the drive (default 600)")
+    parser.add_argument("--speed", type=float, default=1.0, help="of the sensor's time (default 1: through the driver)")
     parser.add_argument("--viewers", type=int, default=3, help="WebSocket clients (default 3)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     options = parser.parse_args()
@@ -214,7 +246,7 @@ def main() -> int:
         parser.error(f"--seconds must be at least {2 * SETTLED_S:.0f}: the first {SETTLED_S:.0f} are left out")
     options.out.mkdir(parents=True, exist_ok=True)
     enter_private_network()
-    samples, figures = drive(options.out.resolve(), options.seconds, options.viewers)
+    samples, figures = drive(options.out.resolve(), options.seconds, options.viewers, options.speed)
     troubles = judged(samples, figures)
     with open(options.out / "soak.csv", "w", newline="") as file:
         writer = csv.DictWriter(file, list(asdict(samples[0])))

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <limits>
 
 #include "frontend/lio.h"
@@ -217,6 +218,27 @@ TEST(Fault_F7, AScanOfAMillionPointsIsMatchedWithTheConfiguredNumber) {
   EXPECT_LT(run.error_at_end(), 0.2);
 }
 
+TEST(Fault_F7, ScansTenTimesTooOftenAreRefusedByNameAndTheOthersKeepThePose) {
+  Drive input = drive();
+  std::vector<Scan> often;
+  for (const Scan& scan : input.scans) {
+    for (std::int32_t copy = 0; copy < 10; ++copy) {
+      Scan& shifted = often.emplace_back(scan);
+      shifted.utime += copy * 5'000;
+      shifted.sequence = static_cast<std::int32_t>(often.size());
+    }
+  }
+  input.scans = often;
+  const Watched run(input);
+  const auto refused = std::ranges::count_if(
+      run.scans, [](const ScanResult& result) { return result.stats.reason == ScanReason::kTooOften; });
+  EXPECT_GE(run.scans.size() + 1, often.size()) << "each scan has its verdict, but the last may wait for its samples";
+  EXPECT_GT(refused, std::ssize(often) * 3 / 4);
+  EXPECT_EQ(run.trust.back().second, Trust::kOk);
+  EXPECT_EQ(run.lio.session(), 0);
+  EXPECT_LT(run.error_at_end(), 0.2);
+}
+
 TEST(Fault_F8, PointTimesThatAreUnsortedOrOutsideTheScanAreClamped) {
   Drive input = drive();
   for (std::size_t i = 100; i < input.scans.size(); ++i) {
@@ -260,6 +282,46 @@ TEST(Fault_F9, StampsOfTheFarFutureBeforeAllOthersLeaveTheResultBitIdentical) {
   EXPECT_TRUE(run.scans.back().stats.applied());
   EXPECT_EQ(run.scans.back().state.T_odom_body.translation, undisturbed.scans.back().state.T_odom_body.translation);
   EXPECT_EQ(run.scans.back().covariance, undisturbed.scans.back().covariance);
+}
+
+/// Each scan comes when the samples that cover it are there. Calls `look` after each.
+void feed(Lio& lio, const Drive& input, const std::function<void(const ScanResult&)>& look) {
+  auto scan = input.scans.begin();
+  const auto show = [&](const std::vector<ScanResult>& results) { std::ranges::for_each(results, look); };
+  for (const ImuSample& sample : input.imu) {
+    show(lio.add_imu(sample).scans);
+    for (; scan != input.scans.end() && scan->end_utime() <= sample.utime; ++scan) show(lio.add_scan(*scan));
+  }
+}
+
+TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnannouncedError) {
+  for (const double seconds : {0.25, 0.5, 1.0, 2.0, 2.9, 4.0}) {
+    Drive input = drive();
+    const Utime from = sample_at(input, 8.0)->utime;
+    const Utime to = from + to_micros(seconds);
+    std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+    std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+    Lio lio(test::tuned_config());
+    double error = 0.0;
+    int unannounced = 0;
+    bool was_lost = false;
+    feed(lio, input, [&](const ScanResult& scan) {
+      if (!scan.has_state) return;
+      const Pose truth = drive().truth(test::drive_seconds(drive(), scan.stats.utime));
+      error = (scan.state.T_odom_body.translation - truth.translation).norm();
+      was_lost = was_lost || lio.status().trust == Trust::kLost || scan.stats.session > 0;
+      unannounced += error > 0.5 && !was_lost && lio.status().trust == Trust::kOk ? 1 : 0;
+    });
+    std::cout << "hung " << seconds << " s: session " << lio.session() << ", error " << error << " m, "
+              << lio.status().reason << "\n";
+    EXPECT_EQ(unannounced, 0) << seconds;
+    if (seconds <= 2.0) {
+      EXPECT_LT(error, 0.3) << seconds;
+    }
+    if (seconds > 3.0) {
+      EXPECT_NE(lio.status().reason.find("neither IMU data nor scans"), std::string::npos);
+    }
+  }
 }
 
 TEST(Fault_F11, BeingCarriedElsewhereIsALossANewSessionAndAFind) {

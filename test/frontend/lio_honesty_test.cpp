@@ -19,6 +19,7 @@ using test::Sensors;
 struct Nees {
   double position = 0.0;  ///< per degree of freedom, mean over the scans
   double attitude = 0.0;
+  double nis = 0.0;  ///< of the innovations, per direction that a scan observes
 };
 
 Nees nees_of(std::uint32_t seed) {
@@ -38,11 +39,13 @@ Nees nees_of(std::uint32_t seed) {
     const Eigen::Vector3d shift = truth.translation - scan.state.T_odom_body.translation;
     const Eigen::Vector3d turn = so3::log(scan.state.T_odom_body.rotation.conjugate() * truth.rotation);
     nees.position += shift.dot(scan.covariance.block<3, 3>(kPosition, kPosition).inverse() * shift) / 3.0;
+    nees.nis += scan.stats.nis_directions > 0 ? scan.stats.nis / scan.stats.nis_directions : 0.0;
     nees.attitude += turn.dot(scan.covariance.block<3, 3>(kAttitude, kAttitude).inverse() * turn) / 3.0;
     ++count;
   }
   nees.position /= count;
   nees.attitude /= count;
+  nees.nis /= count;
   return nees;
 }
 
@@ -53,9 +56,11 @@ TEST(LioHonesty, ErrorsOfFiveDrivesAreWhatTheCovarianceSays) {
     const Nees nees = nees_of(seed);
     mean.position += nees.position / kSeeds;
     mean.attitude += nees.attitude / kSeeds;
+    mean.nis += nees.nis / kSeeds;
   }
   RecordProperty("position_nees_per_dof", std::to_string(mean.position));
   RecordProperty("attitude_nees_per_dof", std::to_string(mean.attitude));
+  RecordProperty("nis_per_direction", std::to_string(mean.nis));
   // 95 % of chi-square with 5 x 3 degrees of freedom, one draw a drive: scans of one drive share their errors.
   EXPECT_GT(mean.position, 6.26 / 15.0);
   EXPECT_LT(mean.position, 27.49 / 15.0);

@@ -52,9 +52,17 @@ TEST(TrustMonitor, FiveScansWithoutACorrectionDegradeAndTwoSecondsLose) {
   expect(feed.monitor, Trust::kDegraded, "too few points found a plane");
   feed.run(36);
   expect(feed.monitor, Trust::kLost, "no scan applied");
+}
+
+TEST(TrustMonitor, ScansThatFitAgainAfterALossFindThePlaceOnlyOnceTenOfThemAgree) {
+  Feed feed;
+  feed.evidence.stats.reason = ScanReason::kTooFewMatches;
+  feed.run(41);
   feed.evidence.stats.reason = ScanReason::kApplied;
+  feed.run(9);
+  expect(feed.monitor, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
   feed.run(1);
-  EXPECT_EQ(feed.monitor.trust(), Trust::kOk);
+  expect(feed.monitor, Trust::kOk, "OK");
 }
 
 TEST(TrustMonitor, APoseThatIsNotKnownIsNotOk) {

@@ -22,6 +22,7 @@ TEST(PeerWatch, IsContentWithEqualsAndWithItself) {
     watch.observe(peer("map_builder", 11), i);
   }
   EXPECT_EQ(watch.trouble(9.0), "");
+  EXPECT_FALSE(watch.needs_person(9.0));
 }
 
 TEST(PeerWatch, NamesWhoseConfigurationDiffers) {
@@ -30,6 +31,7 @@ TEST(PeerWatch, NamesWhoseConfigurationDiffers) {
   other.config_hash = "bb";
   watch.observe(other, 1.0);
   EXPECT_EQ(watch.trouble(1.5), "configuration differs from that of map_builder (ours aa, its bb)");
+  EXPECT_TRUE(watch.needs_person(1.5));
 }
 
 TEST(PeerWatch, NamesWhoseVersionDiffers) {
@@ -38,6 +40,12 @@ TEST(PeerWatch, NamesWhoseVersionDiffers) {
   other.version = "0.9";
   watch.observe(other, 1.0);
   EXPECT_EQ(watch.trouble(1.5), "version 1.0 differs from 0.9 of l1_driver");
+}
+
+TEST(PeerWatch, IsNotContradictedByAPeerThatSaysNothingAboutItself) {
+  PeerWatch watch(kSelf);
+  watch.observe({.process = "a_tool", .pid = 12, .version = "", .config_hash = ""}, 1.0);
+  EXPECT_EQ(watch.trouble(1.5), "");
 }
 
 TEST(PeerWatch, ForgetsWhoFellSilent) {
@@ -65,6 +73,19 @@ TEST(PeerWatch, BelievesInASecondInstanceOnlyWhenItGoesOn) {
   watch.observe(peer("lio_frontend", 9), 1.0);
   watch.observe(peer("lio_frontend", 9), 2.0);
   EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 9)");
+}
+
+TEST(Fault_P7, AProcessThatIsStartedFiveTimesWithinAMinuteIsNamedUntilItStays) {
+  PeerWatch watch(kSelf);
+  for (int start = 0; start < 5; ++start) {
+    EXPECT_EQ(watch.trouble(2.0 * start), "") << start;
+    watch.observe(peer("map_builder", 100 + start), 2.0 * start);
+    watch.observe(peer("map_builder", 100 + start), 2.0 * start + 1.0);
+  }
+  EXPECT_EQ(watch.trouble(9.1), "map_builder was started 5 times within 60 s");
+  EXPECT_TRUE(watch.needs_person(9.1));
+  watch.observe(peer("map_builder", 104), 60.1);
+  EXPECT_EQ(watch.trouble(60.1), "") << "the last one has stayed";
 }
 
 TEST(Fault_B6, AFloodOfInventedProcessesIsRememberedInPart) {

@@ -59,3 +59,29 @@ def test_process_says_ready_feeds_the_watchdog_and_starves_it_when_it_hangs(
         listener.close()
         os.close(near)
         os.close(far)
+
+
+def test_fault_d6_a_supervised_driver_waits_for_a_port_that_is_not_there_yet(private_network, tmp_path: Path) -> None:
+    port = tmp_path / "l1"
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    listener.bind(str(tmp_path / "notify"))
+    near, far = os.openpty()
+    process = subprocess.Popen(
+        [binary("l1_driver"), "--config", CONFIG, "--port", port],
+        env={**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify")},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+    )
+    try:
+        said = heard(listener, 2.0)
+        assert "READY=1" in said and any("is gone, trying again" in word for word in said), said
+        port.symlink_to(os.ttyname(far))
+        assert process.stderr is not None
+        lines = [process.stderr.readline().decode(), process.stderr.readline().decode()]
+        assert "trying again" in lines[0] and "is back" in lines[1], lines
+    finally:
+        process.kill()
+        process.wait()
+        listener.close()
+        os.close(near)
+        os.close(far)

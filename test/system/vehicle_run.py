@@ -36,7 +36,7 @@ class Vehicle:
         self.folder = folder
         self.listener = Listener(url)
         self.seconds: dict[str, float] = {}
-        self.voxels_before = 0
+        self.driver_gaps: list[float] = []
 
     def health(self, process: str) -> Any:
         """Newest HEALTH of a process."""
@@ -60,6 +60,19 @@ class Vehicle:
         back = time.monotonic()
         self.wait(lambda: self.listener.channels[output].last_at > back, BACK_WITHIN_S)
         return time.monotonic() - began
+
+    def gap_of_killed_driver(self) -> float:
+        """Kills the driver; for so many seconds nothing came from the sensor."""
+        old = self.health("l1_driver").pid
+        os.kill(old, signal.SIGKILL)
+        began = time.monotonic()
+        self.listener.listen(0.02)  # what was on its way
+        before = self.listener.channels["L1_IMU"].received
+        while self.listener.channels["L1_IMU"].received == before and time.monotonic() - began < BACK_WITHIN_S:
+            self.listener.listen(0.005)
+        gap = time.monotonic() - began
+        self.wait(lambda: self.health("l1_driver").pid != old, BACK_WITHIN_S)
+        return gap
 
 
 OUTPUTS = {

@@ -5,14 +5,13 @@ import json
 import time
 import urllib.request
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from vehicle_peers import health
 from vehicle_run import BACK_WITHIN_S, CONFIG, OUTPUTS, PORT, VICTIMS, Vehicle, command, simulated_vehicle
 
 from ignis.bus import Listener
-from ignis.pipeline import Pipeline, effective_config
+from ignis.pipeline import effective_config
 from ignis.status import all_well, disagreements, page
 
 
@@ -23,6 +22,9 @@ def vehicle(private_network, tmp_path_factory: pytest.TempPathFactory) -> Iterat
         for victim in VICTIMS:
             driven.seconds[victim] = driven.kill(victim, OUTPUTS[victim])
             driven.listener.listen(4.0)
+        for _ in range(2):
+            driven.driver_gaps.append(driven.gap_of_killed_driver())
+            driven.listener.listen(1.5)  # what has lived for less than a second is started a second later
         driven.listener.listen(3.0)
         yield driven
 
@@ -31,6 +33,8 @@ def test_every_killed_process_is_back_and_its_output_flows(vehicle: Vehicle) -> 
     print({name: round(seconds, 2) for name, seconds in vehicle.seconds.items()})
     assert set(vehicle.seconds) == set(VICTIMS)
     assert all(seconds < BACK_WITHIN_S for seconds in vehicle.seconds.values())
+    # A busy machine may delay one of them.
+    assert min(vehicle.driver_gaps) < 0.5, vehicle.driver_gaps
     assert vehicle.seconds["lio_frontend"] < 2.0 and vehicle.health("lio_frontend").resets == 0
 
 
@@ -82,25 +86,6 @@ def test_echo_and_hz_show_the_bus(vehicle: Vehicle) -> None:
 def test_second_up_is_refused(vehicle: Vehicle) -> None:
     again = command("up", "--config", CONFIG, "--state", vehicle.folder / "state")
     assert again.returncode == 2 and "already up" in again.stderr
-
-
-def test_processes_with_another_configuration_call_themselves_degraded(private_network, tmp_path: Path) -> None:
-    url = effective_config(CONFIG)["lcm"]["url"].replace(":7667", ":7668")
-    with Pipeline(tmp_path, url) as pipeline:
-        listener = Listener(url)
-        pipeline.start("lio_frontend", "--config", CONFIG)
-        pipeline.start("graph_backend", "--config", CONFIG, "--set", "backend.shadow_swap_m=0.02")
-        deadline = time.monotonic() + 30.0
-
-        def complaints() -> list[str]:
-            newest = (message for _, message in listener.health.values())
-            return [m.process for m in newest if m.state == m.DEGRADED and "configuration differs" in m.state_text]
-
-        while len(complaints()) < 2 and time.monotonic() < deadline:
-            pipeline.check()
-            listener.listen(0.2)
-        assert sorted(complaints()) == ["graph_backend", "lio_frontend"]
-        assert "processes disagree about the configuration" in page(listener, colour=False)
 
 
 def test_status_counts_a_disagreement_and_a_missing_process_as_not_well(private_network) -> None:

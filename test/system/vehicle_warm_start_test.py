@@ -233,7 +233,8 @@ def test_a_second_front_end_on_the_same_folder_is_refused(private_network, tmp_p
         while not (folder / "lio_frontend.lock").exists():
             assert time.monotonic() < deadline
             time.sleep(0.05)
-        second = Pipeline(tmp_path / "second", pipeline.environment["LCM_DEFAULT_URL"])
+        # On another bus: on the same one the process is refused before it looks at the folder.
+        second = Pipeline(tmp_path / "second", pipeline.environment["LCM_DEFAULT_URL"].replace(":7667", ":7668"))
         with second:
             assert second.start("lio_frontend", "--config", CONFIG, "--checkpoint", folder).wait(10) == 1
             assert "another lio_frontend uses the checkpoint" in second.last_words("lio_frontend")

@@ -16,6 +16,8 @@ export interface PageHook {
   deltas: number;
   resyncs: number;
   errors: number;
+  /** Texts whose content was not what it should be. */
+  refusedTexts: number;
   bytes: number;
   /** As reported to the server, and as it confirmed. */
   viewRadius: number;
@@ -49,7 +51,7 @@ export const KEPT_APPLIED = 2000;
 export function makeHook({ audit, knobs }: Pick<PageHook, "audit" | "knobs">): PageHook {
   const hook: PageHook = {
     connected: false, connections: 0, sequence: 0, revision: 0, checksum: "", counts: [0, 0, 0], hud: null,
-    snapshots: 0, deltas: 0, resyncs: 0, errors: 0, bytes: 0, viewRadius: 0, servedRadius: 0, lastFrameAt: 0, drawn: 0,
+    snapshots: 0, deltas: 0, resyncs: 0, errors: 0, refusedTexts: 0, bytes: 0, viewRadius: 0, servedRadius: 0, lastFrameAt: 0, drawn: 0,
     applied: [], paths: { eskf: 0, smoothed: 0 }, keyframes: 0, loops: [], loopClouds: [0, 0], events: 0,
     vehicle: [0, 0, 0], cameraTarget: [0, 0, 0], audit, knobs,
   };

@@ -8,9 +8,11 @@ import { checksumOf, encode, type TestVoxel } from "./frames";
 
 const voxel = (x: number): TestVoxel => ({ level: 0, cell: [x, 0, 0], intensity: 9, flags: 0 });
 let sent: ClientText[], texts: ServerText[], applied: Applied[], session: StreamSession;
+let tick = 0;
 
 beforeEach(() => {
   [sent, texts, applied] = [[], [], []];
+  tick = 0;
   session = new StreamSession(new VoxelStore(), {
     send: (message) => sent.push(message),
     text: (message) => texts.push(message),
@@ -23,7 +25,7 @@ beforeEach(() => {
 function offer(kind: "snapshot" | "delta", sequence: number, held: TestVoxel[], records = held, checksum = checksumOf(held)): void {
   const base = kind === "delta" ? { base: sequence - 1 } : {};
   session.takeText(JSON.stringify({ type: "frame", kind, sequence, ...base, revision: sequence, counts: [held.length, 0, 0], checksum, utime: 0 }));
-  session.takeBinary(encode({ voxels: records }), 0);
+  session.takeBinary(encode({ voxels: records }), tick);
 }
 
 describe("StreamSession", () => {
@@ -53,10 +55,25 @@ describe("StreamSession", () => {
     expect(sent).toEqual([{ resync: true }]);
   });
 
-  it("counts a snapshot that does not fit, without asking in circles", () => {
-    offer("snapshot", 1, [voxel(1)], [voxel(2)]);
-    offer("delta", 2, [voxel(1), voxel(3)], [voxel(3)]);
-    expect([sent.length, session.errors]).toEqual([0, 2]);
+  it("counts snapshots that do not fit, and soon asks for others less often", () => {
+    for (let sequence = 1; sequence <= 10; sequence++) offer("snapshot", sequence, [voxel(1)], [voxel(2)]);
+    expect([sent.length, session.errors]).toEqual([2, 10]);
+    tick = 60;
+    offer("snapshot", 11, [voxel(1)], [voxel(2)]);
+    offer("snapshot", 12, [voxel(1)], [voxel(2)]);
+    expect(sent.length).toBe(3);
+    offer("snapshot", 13, [voxel(1)]);
+    offer("delta", 14, [voxel(1), voxel(3)], [voxel(4)]);
+    expect([sent.length, session.errors]).toEqual([4, 12]);
+  });
+
+  it("asks again when the snapshot that it asked for never comes", () => {
+    offer("snapshot", 1, [voxel(1)]);
+    for (let sequence = 5; sequence < 20; sequence++) offer("delta", sequence, [voxel(2)]);
+    expect(sent.length).toBe(1);
+    tick = 50;
+    offer("delta", 20, [voxel(2)]);
+    expect(sent.length).toBe(2);
   });
 
   it("begins anew after a reconnection", () => {
@@ -86,6 +103,6 @@ describe("StreamSession", () => {
 
 describe("pauseBefore", () => {
   it("doubles up to a limit", () => {
-    expect([1, 2, 3, 4, 5, 6, 60].map(pauseBefore)).toEqual([500, 1000, 2000, 4000, 8000, 8000, 8000]);
+    expect([1, 2, 3, 4, 5, 6, 60].map(pauseBefore)).toEqual([500, 1000, 1500, 1500, 1500, 1500, 1500]);
   });
 });

@@ -4,7 +4,8 @@
 import { PROTOCOL, type ClientText } from "./protocol";
 
 const FIRST_PAUSE_MS = 500;
-const LONGEST_PAUSE_MS = 8000;
+/** A server that is back is found within two seconds, however long it was gone. */
+const LONGEST_PAUSE_MS = 1500;
 /** The server sends a status text ten times a second: a connection silent for so long is dead. */
 const SILENCE_MS = 6000;
 

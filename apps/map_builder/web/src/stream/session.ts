@@ -7,6 +7,10 @@ import type { ClientText, FrameAnnouncement, LoopClouds, PerLevel, ServerText } 
 import { VoxelStore } from "./voxel_store";
 
 /** What is held after a frame, beside what the server announced for it. */
+/** After so many snapshots in a row that do not fit the next one is asked for later [tenths of a second]. */
+const MOST_MISFITS = 3;
+const ASK_PAUSE = 50;
+
 export interface Applied {
   sequence: number;
   revision: number;
@@ -30,7 +34,8 @@ export class StreamSession {
   resyncs = 0;
   errors = 0;
   private sequence: number | null = null; // null: only a snapshot helps
-  private fits = true; // the last snapshot had the announced checksum
+  private misfits = 0; // snapshots in a row without the announced checksum
+  private askedAt = 0; // tick of the newest demand
   private announced: FrameAnnouncement | LoopClouds | null = null;
 
   constructor(private readonly store: VoxelStore, private readonly events: SessionEvents) {}
@@ -42,10 +47,13 @@ export class StreamSession {
   }
 
   takeText(text: string): void {
-    let message: ServerText;
+    let message: ServerText | null = null;
     try {
-      message = JSON.parse(text) as ServerText;
+      message = JSON.parse(text) as ServerText | null;
     } catch {
+      // Counted below.
+    }
+    if (typeof message !== "object" || message === null) {
       this.errors++;
       return;
     }
@@ -63,15 +71,15 @@ export class StreamSession {
     } catch (error) {
       if (!(error instanceof RangeError)) throw error;
       this.errors++;
-      this.resync();
+      this.resync(tick);
     }
   }
 
   private takeFrame(announced: FrameAnnouncement, buffer: ArrayBuffer, tick: number): void {
     const isSnapshot = announced.kind === "snapshot";
-    if (!isSnapshot && this.sequence === null) return; // a snapshot has been asked for and is on its way
     if (!isSnapshot && announced.base !== this.sequence) {
-      this.resync();
+      // A snapshot that has been asked for is on its way, unless something between swallowed it.
+      if (this.sequence !== null || tick - this.askedAt >= ASK_PAUSE) this.resync(tick);
       return;
     }
     const frame = decodeFrame(buffer);
@@ -96,12 +104,16 @@ export class StreamSession {
       },
       frame,
     );
-    if (isSnapshot) this.fits = checksum === announced.checksum;
-    // A snapshot that does not fit is counted and shown; asking for another one would only go in circles.
-    if (checksum !== announced.checksum) this.fits ? this.resync() : this.errors++;
+    const fits = checksum === announced.checksum;
+    if (isSnapshot) this.misfits = fits ? 0 : this.misfits + 1;
+    if (fits) return;
+    if (this.misfits > 0) this.errors++;
+    if (this.misfits >= MOST_MISFITS && tick - this.askedAt < ASK_PAUSE) return;
+    this.resync(tick);
   }
 
-  private resync(): void {
+  private resync(tick: number): void {
+    this.askedAt = tick;
     this.sequence = null;
     this.resyncs++;
     this.events.send({ resync: true });

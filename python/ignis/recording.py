@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording in progress: LCM's own logger, kept going over a full disk and its own death."""
+
+import argparse
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from datetime import datetime
+from pathlib import Path
+
+import lcm
+from ignis_lcm.ignis import health_t
+
+from ignis.errors import InputError
+from ignis.log_config import CONFIG_CHANNEL, encoded
+from ignis.log_tail import LogTail
+from ignis.mounts import effective_config
+from ignis.pipeline import program
+
+_STOP_S = 10.0
+_LEAST_LIFE_S = 2.0  # of a logger that is worth starting again
+_ROOM_AGAIN = 1.2  # of --keep-free-mb
+_DEFAULT_CONFIG = Path("config") / "ignis8_tuned.json"
+
+
+class Recording:
+    """What is recorded into one file after another, and what is known about it.
+
+    A new file begins when the logger was killed, and when a disk that was nearly full has room again: what was written
+    is left as it is. Meanwhile HEALTH says FAULT.
+    """
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        checkout = Path(os.environ.get("IGNIS_CHECKOUT", "."))
+        self._options = options
+        self.config = effective_config(options.config or checkout / _DEFAULT_CONFIG)
+        default_url = os.environ.get("LCM_DEFAULT_URL") or self.config.get("lcm", {}).get("url", "")
+        self.url: str = options.lcm_url or default_url
+        self.output: Path = options.output or Path(f"ignis-{datetime.now():%Y%m%d-%H%M%S}.lcmlog")
+        self._refuse_what_cannot_work()
+        self.tail = LogTail(self.file(0))
+        self.paused = False
+        self.interruptions: list[str] = []
+        self._first = self.output
+        self._finished: list[Path] = []
+        self._number = 0
+        self._health_sequence = 0
+        self._bus = self._open_bus()
+        self._start_logger()
+
+    def _start_logger(self) -> None:
+        self._started = time.monotonic()
+        self.logger = subprocess.Popen(
+            self._command(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            start_new_session=True,
+        )  # fmt: skip
+
+    def _refuse_what_cannot_work(self) -> None:
+        options = self._options
+        try:
+            re.compile(options.channels)
+        except re.error as error:
+            raise InputError(f"--channels {options.channels}: not a regular expression: {error}") from None
+        if options.split_mb is not None and not 1.0 <= options.split_mb <= 1e6:
+            raise InputError(f"--split-mb {options.split_mb:g}: allowed is 1 to 1000000 (the logger counts whole MB)")
+        if not self.output.parent.is_dir():
+            raise InputError(f"the folder {self.output.parent} does not exist; make it first")
+        existing = [path for path in (self.output, self.file(0)) if path.exists()]
+        if existing and not options.force:
+            raise InputError(f"{existing[0]} exists; choose another name with -o, or --force to overwrite it")
+        if self.output.is_dir():
+            raise InputError(f"{self.output} is a folder; give the name of a file to write")
+        if existing and options.split_mb is not None:
+            raise InputError(f"{existing[0]} exists, and split recordings never overwrite; choose another name with -o")
+        if self.free_mb() < options.keep_free_mb:
+            raise InputError(f"only {self.free_mb():.0f} MB are free; --keep-free-mb is {options.keep_free_mb:.0f}")
+
+    def _open_bus(self) -> lcm.LCM:
+        try:
+            return lcm.LCM(self.url)
+        except RuntimeError:
+            raise InputError(
+                f"cannot open the message bus {self.url}. If multicast has no route, run: sudo ip link set lo up "
+                "multicast on && sudo ip route add 224.0.0.0/4 dev lo"
+            ) from None
+
+    def _command(self) -> list[str]:
+        options = self._options
+        quota = f"--disk-quota={max(options.keep_free_mb / 2.0, 1.0):.0f}M"
+        command = [str(program("lcm-logger")), "--quiet", "--lcm-url", self.url, "--channel", options.channels, quota]
+        if CONFIG_CHANNEL not in options.channels and options.channels != ".*":
+            command[command.index(options.channels)] = f"({options.channels})|{CONFIG_CHANNEL}"
+        if options.split_mb is not None:
+            # The long form, --increment, swallows the next argument (LCM 1.5.3).
+            command += ["-i", f"--split-mb={options.split_mb:g}"]
+        elif options.force:
+            command.append("--force")
+        return [*command, str(self.output)]
+
+    def file(self, number: int) -> Path:
+        """The files of a recording that is split are numbered by the logger."""
+        return (
+            self.output if self._options.split_mb is None else self.output.with_name(f"{self.output.name}.{number:02d}")
+        )
+
+    def free_mb(self) -> float:
+        return shutil.disk_usage(self.output.resolve().parent).free / 1e6
+
+    def publish_config(self) -> None:
+        self._bus.publish(CONFIG_CHANNEL, encoded(self.config))
+
+    def look(self) -> None:
+        """Reads what has come, over the border of a split file too."""
+        if self.paused:
+            return
+        self.tail.update()
+        while self._options.split_mb is not None and self.file(self._number + 1).exists():
+            self.tail.update()
+            self._number += 1
+            self.tail.follow(self.file(self._number))
+            self.tail.update()
+            self.publish_config()  # Each file can be replayed alone.
+
+    def files(self) -> list[Path]:
+        """All that hold a part of the recording, in their order."""
+        current = [self.file(number) for number in range(self._number + 1)]
+        return [path for path in [*self._finished, *current] if path.exists()]
+
+    def keep_going(self) -> str | None:
+        """Pauses when the disk is nearly full and goes on when it is not; starts a logger anew that has ended.
+
+        Returns what happened, for people; nothing as long as all is as it was.
+        """
+        free, keep = self.free_mb(), self._options.keep_free_mb
+        if self.paused:
+            if free < _ROOM_AGAIN * keep:
+                self._tell(health_t.FAULT, f"recording paused: the disk has less than {keep:.0f} MB left")
+                return None
+            self._tell(health_t.OK, "recording goes on")
+            self._begin_next_file()
+            self.paused = False
+            return f"the disk has room again; recording goes on in {self.file(0)}"
+        if free < keep:
+            self._tell(health_t.FAULT, f"recording paused: the disk has less than {keep:.0f} MB left")
+            self._end_logger()
+            # Whoever makes room by removing the file must get it.
+            self.tail.close()
+            self.paused = True
+            self.interruptions.append(f"the disk has less than {keep:.0f} MB left")
+            return f"{self.interruptions[-1]}: paused until there is room"
+        if self.logger.poll() is None:
+            return None
+        return self._succeed_logger()
+
+    def _succeed_logger(self) -> str:
+        """The logger has ended on its own; one that cannot work at all is not started again."""
+        code = self.logger.returncode
+        said = (self.logger.stderr.read() if self.logger.stderr else "").strip().splitlines()
+        if time.monotonic() - self._started < _LEAST_LIFE_S:
+            raise InputError(f"lcm-logger ended with code {code}: {(said or ['no message'])[-1]}")
+        self.interruptions.append(f"lcm-logger ended with code {code}")
+        self._begin_next_file()
+        return f"{self.interruptions[-1]}; recording goes on in {self.file(0)}"
+
+    def _begin_next_file(self) -> None:
+        """FILE-2.lcmlog, FILE-3.lcmlog, ...: the next one that does not exist."""
+        self.look()
+        self._finished = self.files()
+        self._number, part = 0, 2
+        while True:
+            self.output = self._first.with_name(f"{self._first.stem}-{part}{self._first.suffix}")
+            if not self.output.exists() and not self.file(0).exists():
+                break
+            part += 1
+        self.tail.follow(self.file(0))
+        self._start_logger()
+
+    def _tell(self, state: int, text: str) -> None:
+        """What the status page shows of the recording; in good times nothing, since it would be recorded as well."""
+        message = health_t()
+        message.process, message.pid, message.state, message.state_text = "ignis_record", os.getpid(), state, text
+        message.sequence = self._health_sequence
+        self._health_sequence += 1
+        self._bus.publish("HEALTH", message.encode())
+
+    def stop(self) -> None:
+        """Lets the logger write its last records."""
+        if not self.paused:
+            self._end_logger()
+        self.tail.close()
+
+    def _end_logger(self) -> None:
+        if self.logger.poll() is None:
+            self.logger.send_signal(signal.SIGINT)
+            try:
+                self.logger.wait(_STOP_S)
+            except subprocess.TimeoutExpired:
+                self.logger.kill()
+                self.logger.wait()
+        self.look()

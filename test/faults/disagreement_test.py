@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows C4, B7 and P7: processes that do not belong together, a second instance, and one that ends again and again."""
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fault_drive import BUS, CONFIG
+from ignis.bus import Listener
+from ignis.pipeline import Pipeline, binary
+from ignis.supervision import S6Supervisor
+
+# Neither reads from a sensor nor opens a port.
+PAIR = ("lio_frontend", "graph_backend")
+FAULT_WITHIN_S = 2.0
+BUSY_S = 1.5  # that a busy machine may add
+STARTS = 5
+LOOP_S = 10.0
+END_AT_ONCE = "echo no sensor today; exit 3"
+
+
+class Bus:
+    """What the processes say of themselves."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self.listener = Listener(BUS, "HEALTH")
+
+    def health(self, process: str) -> Any:
+        """The newest HEALTH of a process."""
+        found = [entry for (name, _), entry in self.listener.health.items() if name == process]
+        return max(found, key=lambda entry: entry[0])[1] if found else None
+
+    def wait(self, holds: Callable[[], bool], seconds: float = 20.0) -> float:
+        """Seconds until it held."""
+        began = time.monotonic()
+        while not holds():
+            assert time.monotonic() - began < seconds, {
+                key: entry[1].state_text for key, entry in self.listener.health.items()
+            }
+            self.listener.listen(0.05)
+        return time.monotonic() - began
+
+    def is_fault(self, process: str, words: str) -> bool:
+        """Whether a process calls itself FAULT and says these words."""
+        newest = self.health(process)
+        return newest is not None and newest.state == newest.FAULT and words in newest.state_text
+
+
+def test_fault_c4_processes_that_disagree_are_a_fault_within_two_seconds_and_keep_what_they_loaded(
+    private_network: None, tmp_path: Path
+) -> None:
+    file = tmp_path / "config.json"
+    shutil.copy(CONFIG, file)
+    with Pipeline(tmp_path, BUS) as pipeline:
+        bus = Bus(pipeline)
+        pipeline.start("lio_frontend", "--config", file)
+        bus.wait(lambda: bus.health("lio_frontend") is not None)
+        before = bus.health("lio_frontend")
+        # The file is edited while one process runs and before the other starts.
+        text = file.read_text()
+        file.write_text(text.replace('"keyframe_dist_m": ', '"keyframe_dist_m": 1'))
+        assert file.read_text() != text
+        pipeline.start("graph_backend", "--config", file)
+        bus.wait(lambda: bus.health("graph_backend") is not None)
+        took = bus.wait(lambda: all(bus.is_fault(name, "configuration differs") for name in PAIR))
+        after = bus.health("lio_frontend")
+    assert took < FAULT_WITHIN_S + BUSY_S
+    assert after.config_hash == before.config_hash != bus.health("graph_backend").config_hash
+
+
+def test_fault_b7_a_second_instance_of_any_process_refuses_to_start_and_the_first_goes_on(
+    private_network: None, tmp_path: Path
+) -> None:
+    with Pipeline(tmp_path, BUS) as pipeline, Pipeline(tmp_path / "second", BUS) as seconds:
+        bus = Bus(pipeline)
+        for name in PAIR:
+            pipeline.start(name, "--config", CONFIG)
+        bus.wait(lambda: all(bus.health(name) for name in PAIR))
+        for name in PAIR:
+            assert seconds.start(name, "--config", CONFIG).wait(20.0) == 1
+            assert f"another {name} is on the bus" in seconds.last_words(name)
+        bus.listener.listen(1.5)
+        pipeline.check()
+        assert all("second" not in bus.health(name).state_text for name in PAIR)
+
+
+def test_fault_p7_a_process_that_is_killed_and_started_again_and_again_is_a_fault_to_the_others(
+    private_network: None, tmp_path: Path
+) -> None:
+    with Pipeline(tmp_path, BUS) as pipeline:
+        bus = Bus(pipeline)
+        pipeline.start("graph_backend", "--config", CONFIG)
+        bus.wait(lambda: bus.health("graph_backend") is not None)
+        for _ in range(STARTS):
+            process = pipeline.start("lio_frontend", "--config", CONFIG)
+            bus.wait(lambda pid=process.pid: ("lio_frontend", pid) in bus.listener.health)
+            process.kill()
+            process.wait()
+        bus.wait(lambda: bus.is_fault("graph_backend", f"lio_frontend was started {STARTS} times within 60 s"))
+
+
+def test_fault_p7_a_process_that_ends_at_once_is_started_ever_later_and_the_others_go_on(
+    private_network: None, tmp_path: Path
+) -> None:
+    commands = {
+        "lio_frontend": [str(binary("lio_frontend")), "--config", str(CONFIG)],
+        "l1_driver": ["/bin/sh", "-c", END_AT_ONCE],
+    }
+    supervisor = S6Supervisor(tmp_path / "state", commands, {"LCM_DEFAULT_URL": BUS})
+    began = time.monotonic()
+    late = supervisor.start(LOOP_S)
+    try:
+        assert len(late) == 1 and late[0].startswith("l1_driver (ended "), late
+        assert "exitcode 3: no sensor today" in late[0]
+        listener = Listener(BUS, "HEALTH")
+        listener.listen(1.5)
+        assert any(name == "lio_frontend" for name, _ in listener.health), "the others go on"
+    finally:
+        stopping = time.monotonic()
+        supervisor.stop()
+    assert time.monotonic() - stopping < 8.0, "a process that waits for its start is ended at once"
+    log = (tmp_path / "state" / "log" / "l1_driver" / "current").read_text()
+    print(f"{time.monotonic() - began:.0f} s\n{log}")
+    starts = log.count("no sensor today")
+    assert 4 <= starts <= 7, "without growing waits there would be one a second"
+    assert "ended 4 times within a minute, at last with exitcode 3; next start in 2 s" in log
+    assert "next start in 5 s" in log
