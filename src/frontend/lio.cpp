@@ -22,6 +22,14 @@ constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
 
+/// The position from which a new map begins is exact by definition.
+void define_position(ErrorCovariance& covariance) {
+  constexpr double kVariance = 1e-6;  // m^2: keeps the covariance invertible
+  covariance.middleRows<3>(kPosition).setZero();
+  covariance.middleCols<3>(kPosition).setZero();
+  covariance.diagonal().segment<3>(kPosition).setConstant(kVariance);
+}
+
 double velocity_sigma(const FilterState& filter) {
   return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
 }
@@ -295,6 +303,10 @@ void Lio::follow_moving_start(ScanReason reason) {
   } else if (is_contradiction(reason)) {
     map_.clear();
   }
+  if (!map_.empty()) return;
+  // What the vehicle went before is not in this map; left in, it would count as a part of the way to the next scan.
+  define_position(filter_.covariance);
+  define_position(cautious_);
 }
 
 /// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.

@@ -30,7 +30,7 @@ struct UpdateStep {
 };
 
 /// Minimises |x - prior|^2 in the prior's covariance plus the constraints, linearised at the iterate, where
-/// `deviation` = difference(prior, iterate). With the constraints in six columns only, the 15x15 system reduces to one
+/// `deviation` = difference(prior, iterate). With the constraints in six columns only, the 17x17 system reduces to one
 /// 6x6 solve, and the prior covariance is never inverted:
 ///   M = (I + A P66)^-1 A,  P+ = P - P6 M P6^T,  step = -P+6 b - (d - P6 M d6).
 /// Equal to processing the points one at a time with scalar Kalman gains.
