@@ -9,7 +9,7 @@
 
 namespace ignis {
 
-/// Which states may be told, so that stamps of a session only increase, and which covariance goes with each.
+/// Which states may be told, so that stamps of a session never go back, and which covariance goes with each.
 ///
 /// A scan's state stands at the scan's end. When later inertial samples have been told already, it has corrected the
 /// state of the next one, which then carries the scan's covariance.

@@ -61,7 +61,10 @@ class Hearing {
     const LoopClaim& claim = claims_[place(number).value()];
     if (open_distance(claim.from, claim.to, state_.odometry, rule_) <= config_.loop_support_beyond_m) return true;
     return std::ranges::any_of(believed_, [&](std::size_t i) {
-      return loops_[i].number != number && (is_in_graph(loops_[i].number) || are_apart(claim, claims_[i])) &&
+      const std::int32_t other = loops_[i].number;
+      const bool testifies =
+          is_in(state_.loops, other) || (is_in(state_.waiting, other) && are_apart(claim, claims_[i]));
+      return other != number && testifies &&
              open_distance(claim, claims_[i], state_.odometry, rule_) <= config_.loop_support_beyond_m;
     });
   }
@@ -75,8 +78,8 @@ class Hearing {
     return static_cast<std::size_t>(found - loops_.begin());
   }
 
-  [[nodiscard]] bool is_in_graph(std::int32_t number) const {
-    return std::ranges::find(state_.loops, number, &GraphLoop::number) != state_.loops.end();
+  [[nodiscard]] static bool is_in(const auto& loops, std::int32_t number) {
+    return std::ranges::find(loops, number, &GraphLoop::number) != loops.end();
   }
 
   [[nodiscard]] bool are_apart(const LoopClaim& a, const LoopClaim& b) const {
@@ -146,6 +149,7 @@ void withdraw_outvoted(const Hearing& hearing, IncrementalSolver& solver, Smooth
 /// Whatever still waits says why, once.
 void explain_waiting(const Hearing& hearing, SmootherState& state, LoopEvents& events) {
   for (GraphLoop& loop : state.waiting) {
+    if (!hearing.heard(loop.number)) continue;
     const LoopReason reason = hearing.believed(loop.number) ? LoopReason::kNeedsSupport : LoopReason::kContradictsLoops;
     const bool news = loop.result.reason != reason;
     loop.result.reason = reason;

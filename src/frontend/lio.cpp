@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "frontend/reacquisition.h"
@@ -84,25 +85,26 @@ LioStatus Lio::status() const {
 ImuResult Lio::add_imu(const ImuSample& sample) {
   ImuResult result;
   if (resumed_from_) close_gap(sample.utime);
-  if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
   const std::optional<Utime> before = imu_.empty() ? std::nullopt : std::optional(imu_.newest());
   result.fault = imu_.add(sample);
   if (result.fault != ImuFault::kNone) return result;
-  if (before && bridge_silence(*before, sample.utime) == Bridge::kTooLong) return result;
+  if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
+  const Silence silence = before ? bridge_silence(*before, sample.utime, result.scans) : Silence::kNone;
+  if (silence == Silence::kTooLong) return result;
   trust_.note_imu(sample.utime);
   if (sample.saturated) last_clipped_ = sample.utime;
 
-  if (running_) {
+  if (running_ && silence == Silence::kNone) {
     const std::size_t last = imu_.samples().size() - 1;
     const ImuSample& previous = imu_.samples()[last - 1];
     live_ = predict_nominal(live_, midpoint(previous, sample), seconds_between(previous.utime, sample.utime),
                             config_.gravity_m);
     live_.utime = sample.utime;
-  } else {
+  } else if (!running_) {
     if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
     if (std::optional<FilterState> first = initialisation_.add(sample)) start(*first);
   }
-  result.scans = process_pending();
+  std::ranges::move(process_pending(), std::back_inserter(result.scans));
   if (running_) {
     advance_to(sample.utime - to_micros(config_.max_scan_delay_s));
     imu_.forget_before(filter_.nominal.utime - kHistoryUs);
@@ -207,7 +209,7 @@ ScanResult Lio::process(const Scan& scan) {
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
   std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
-  const double age = mean_age(selection.scan);
+  const double age = config_.deskew ? mean_age(selection.scan) : 0.0;
   const double seen_age = age * new_share(filter_.covariance, mapped_velocity_variance_);
   MatchResult match = correct(cloud, sparse, seen_age);
   match.stats.points = selection.in_range;
@@ -324,8 +326,10 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& matc
   contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
   if (contradictions_ >= config_.reanchor_scans) begin_new_map();
   const bool confirmed = contradictions_ == 0 || map_.empty() || !config_.quarantine;
-  const double share = map_.empty() ? 1.0 : 1.0 / std::max(match.map_age_scans, 1.0);
-  mapped_velocity_variance_ += share * (velocity_variance(filter_.covariance) - mapped_velocity_variance_);
+  if (map_.empty() || match.stats.applied()) {
+    const double share = map_.empty() ? 1.0 : 1.0 / std::max(match.map_age_scans, 1.0);
+    mapped_velocity_variance_ += share * (velocity_variance(filter_.covariance) - mapped_velocity_variance_);
+  }
   map_.insert(cloud, filter_.nominal.T_odom_body, confirmed);
   map_.slide(filter_.nominal.T_odom_body.translation);
 }

@@ -106,8 +106,8 @@ class Lio {
   void start(const FilterState& first);
   void give_up_resumption();
   void close_gap(Utime first_sample);
-  enum class Bridge : std::int8_t { kNone, kBridged, kTooLong };
-  Bridge bridge_silence(Utime before, Utime sample);
+  enum class Silence : std::int8_t { kNone, kBridged, kTooLong };
+  [[nodiscard]] Silence bridge_silence(Utime before, Utime sample, std::vector<ScanResult>& refused);
   void seek_confirmation(ScanReason reason);
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How a front end goes on where its killed predecessor was (see Lio::resume): the gap is closed by the first samples,
+// How a front end goes on where its killed predecessor was (see Lio::resume): speed and turn rate go on over the gap,
 // and scans have to confirm the pose before anything is built on it. A driver that hung leaves the same gap.
 #include <algorithm>
 #include <format>
@@ -14,6 +14,7 @@ namespace {
 constexpr double kConfirmationSeconds = 2.0;     // that a resumption has
 constexpr int kContradictionsOfAWrongPlace = 3;  // in a row; single ones come in any curve
 constexpr double kSilenceSeconds = 0.3;          // of inertial samples and scans, that two samples cannot stand for
+constexpr double kLongestSilence = 3.0;          // s: the longest that is bridged
 constexpr double kUnknownAccel = 1.0;            // [m/s^2] sigma of what a vehicle may do meanwhile
 constexpr double kUnknownTurn = 0.1;             // [rad/s] sigma
 
@@ -27,13 +28,16 @@ void go_on_blindly(FilterState& filter, double seconds) {
   state.v_odom = state.T_odom_body.rotation * v_body;
   state.T_odom_body.translation += 0.5 * seconds * (v_before + state.v_odom);
   state.utime += to_micros(seconds);
-  const double shift = 0.5 * kUnknownAccel * seconds * seconds;
+  const double gain = kUnknownAccel * seconds;
+  const double shift = 0.5 * gain * seconds;
   ErrorCovariance transition = ErrorCovariance::Identity();
   transition.block<3, 3>(kPosition, kVelocity) = seconds * Eigen::Matrix3d::Identity();
   filter.covariance = transition * filter.covariance * transition.transpose();
   filter.covariance.diagonal().segment<3>(kAttitude).array() += kUnknownTurn * seconds * kUnknownTurn * seconds;
   filter.covariance.diagonal().segment<3>(kPosition).array() += shift * shift;
-  filter.covariance.diagonal().segment<3>(kVelocity).array() += kUnknownAccel * seconds * kUnknownAccel * seconds;
+  filter.covariance.diagonal().segment<3>(kVelocity).array() += gain * gain;
+  filter.covariance.block<3, 3>(kPosition, kVelocity).diagonal().array() += shift * gain;
+  filter.covariance.block<3, 3>(kVelocity, kPosition).diagonal().array() += shift * gain;
 }
 
 }  // namespace
@@ -47,15 +51,18 @@ void Lio::resume() {
 }
 
 /// Neither stream said anything since `before`: not two samples for all that were missed, but scans have to tell where
-/// the vehicle is, as after a restart. Over too long a time nothing is left to go on from.
-Lio::Bridge Lio::bridge_silence(Utime before, Utime sample) {
+/// the vehicle is, as after a restart. Over too long a time nothing is left to go on from. Scans that waited for
+/// samples which never came are `refused`.
+Lio::Silence Lio::bridge_silence(Utime before, Utime sample, std::vector<ScanResult>& refused) {
   const double silence = seconds_between(last_scan_end_ ? std::max(before, *last_scan_end_) : before, sample);
-  if (!running_ || !velocity_known_ || !pending_.empty() || silence < kSilenceSeconds) return Bridge::kNone;
-  if (silence > config_.resume_max_gap_s) {
+  if (!running_ || !velocity_known_ || map_.empty() || silence < kSilenceSeconds) return Silence::kNone;
+  for (const Scan& scan : pending_) refused.push_back(refuse(scan, ScanReason::kNoImu));
+  pending_.clear();
+  if (silence > kLongestSilence) {
     reset();
     start_note_ = std::format("new session: neither IMU data nor scans came for {:.1f} s (limit {:.1f})", silence,
-                              config_.resume_max_gap_s);
-    return Bridge::kTooLong;
+                              kLongestSilence);
+    return Silence::kTooLong;
   }
   advance_to(before);
   const double blind = seconds_between(filter_.nominal.utime, sample);
@@ -63,13 +70,14 @@ Lio::Bridge Lio::bridge_silence(Utime before, Utime sample) {
   go_on_blindly(cautious, blind);
   cautious_ = cautious.covariance;
   go_on_blindly(filter_, blind);
+  filter_.nominal.utime = sample;
   live_ = filter_.nominal;
   keyframer_.note_gap();
   unaided_ = filter_;
   confirm_until_ = sample + to_micros(kConfirmationSeconds);
   scans_without_correction_ = kScansUntilReacquisition;
   trust_.note_resumption();
-  return Bridge::kBridged;
+  return Silence::kBridged;
 }
 
 bool Lio::can_be_resumed() const { return running_ && velocity_known_ && !trust_.awaits_confirmation(); }
@@ -80,7 +88,7 @@ bool Lio::is_sound() const {
   const NavState& state = filter_.nominal;
   return running_ && !imu_.empty() && make_symmetric(covariance) && make_symmetric(cautious) &&
          state.T_odom_body.all_finite() && state.v_odom.allFinite() && state.gyro_bias.allFinite() &&
-         state.accel_bias.allFinite();
+         state.accel_bias.allFinite() && state.angular_rate.allFinite() && state.gravity_tilt.allFinite();
 }
 
 /// The first sample after a restart decides whether the gap can be bridged.

@@ -8,7 +8,9 @@ namespace ignis {
 double mean_age(const Scan& scan) {
   if (scan.points.empty()) return 0.0;
   double sum = 0.0;
-  for (const ScanPoint& point : scan.points) sum += 1e-6 * (scan.duration_us - point.dt_us);
+  for (const ScanPoint& point : scan.points) {
+    sum += 1e-6 * (scan.duration_us - std::clamp(point.dt_us, 0, scan.duration_us));
+  }
   return sum / static_cast<double>(scan.points.size());
 }
 

@@ -312,8 +312,6 @@ TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnann
       was_lost = was_lost || lio.status().trust == Trust::kLost || scan.stats.session > 0;
       unannounced += error > 0.5 && !was_lost && lio.status().trust == Trust::kOk ? 1 : 0;
     });
-    std::cout << "hung " << seconds << " s: session " << lio.session() << ", error " << error << " m, "
-              << lio.status().reason << "\n";
     EXPECT_EQ(unannounced, 0) << seconds;
     if (seconds <= 2.0) {
       EXPECT_LT(error, 0.3) << seconds;
@@ -322,6 +320,72 @@ TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnann
       EXPECT_NE(lio.status().reason.find("neither IMU data nor scans"), std::string::npos);
     }
   }
+}
+
+/// A drive without data between 8 s and 8 s + `seconds`; a scan that had just ended waits for its samples if `waiting`.
+Drive silent(double seconds, bool waiting) {
+  Drive input = drive();
+  const Utime from = sample_at(input, 8.0)->utime;
+  const Utime to = from + to_micros(seconds);
+  std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+  std::erase_if(input.scans,
+                [&](const Scan& scan) { return scan.end_utime() >= from + (waiting ? 50'000 : 0) && scan.utime < to; });
+  return input;
+}
+
+TEST(Fault_P7, TheStateGoesOnOverASilenceOnceAndNotTwice) {
+  for (const bool waiting : {false, true}) {
+    const Drive input = silent(1.0, waiting);
+    const Utime to = drive().imu.front().utime + to_micros(9.0);
+    Lio lio(test::tuned_config());
+    auto scan = input.scans.begin();
+    std::optional<NavState> after;
+    int refused = 0;
+    for (const ImuSample& sample : input.imu) {
+      for (; scan != input.scans.end() && scan->utime < sample.utime; ++scan) (void)lio.add_scan(*scan);
+      const ImuResult result = lio.add_imu(sample);
+      for (const ScanResult& each : result.scans) refused += each.stats.reason == ScanReason::kNoImu ? 1 : 0;
+      if (sample.utime < to) continue;
+      after = result.state;
+      break;
+    }
+    ASSERT_TRUE(after.has_value());
+    const Pose truth = drive().truth(test::drive_seconds(drive(), after->utime));
+    EXPECT_LT((after->T_odom_body.translation - truth.translation).norm(), 0.5) << "a second at 1.3 m/s, in a curve";
+    EXPECT_EQ(refused, waiting ? 1 : 0) << "its samples never came";
+  }
+}
+
+TEST(Fault_P7, ASilenceBeforeTheFirstScanLosesNothing) {
+  Drive input = silent(0.5, false);
+  const Utime first = drive().imu.front().utime + to_micros(9.0);
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.utime < first; });
+  Lio lio(test::tuned_config());
+  int applied = 0;
+  feed(lio, input, [&](const ScanResult& scan) { applied += scan.stats.applied() ? 1 : 0; });
+  EXPECT_EQ(lio.session(), 0);
+  EXPECT_GT(applied, 50);
+}
+
+TEST(Fault_P7, ASilenceIsBridgedWhenARestartMayNotGoOn) {
+  FrontendConfig config = test::tuned_config();
+  config.resume_max_gap_s = 0.0;
+  Lio lio(config);
+  feed(lio, silent(0.5, false), [](const ScanResult&) {});
+  EXPECT_EQ(lio.session(), 0);
+}
+
+TEST(Fault_P7, AStampOfTheFarFutureWhileScansHaveYetToConfirmThePlaceEndsNothing) {
+  const Drive input = silent(0.5, false);
+  const Utime to = drive().imu.front().utime + to_micros(8.5);
+  Lio lio(test::tuned_config());
+  feed(lio, input, [&](const ScanResult& scan) {
+    if (scan.stats.utime < to || scan.stats.utime > to + 200'000) return;
+    ImuSample sample = input.imu.back();
+    sample.utime += 3'600'000'000;
+    EXPECT_NE(lio.add_imu(sample).fault, ImuFault::kNone);
+  });
+  EXPECT_EQ(lio.session(), 0);
 }
 
 TEST(Fault_F11, BeingCarriedElsewhereIsALossANewSessionAndAFind) {

@@ -23,6 +23,7 @@ TEST(ScanInstant, MeanAgeIsFromThePointsToTheEndOfTheScan) {
   EXPECT_DOUBLE_EQ(mean_age(scan_of({50'000})), 0.0);
   EXPECT_DOUBLE_EQ(mean_age(scan_of({0, 0, 30'000})), 0.04);
   EXPECT_DOUBLE_EQ(mean_age(Scan{}), 0.0);
+  EXPECT_DOUBLE_EQ(mean_age(scan_of({-2'000'000'000, 2'000'000'000})), 0.025) << "as the points are deskewed";
 }
 
 TEST(ScanInstant, CovarianceIsThatOfThePositionPlusSecondsTimesVelocity) {

@@ -6,11 +6,11 @@ import { decodeFrame, decodeLoopClouds, type Frame } from "./frame";
 import type { ClientText, FrameAnnouncement, LoopClouds, PerLevel, ServerText } from "./protocol";
 import { VoxelStore } from "./voxel_store";
 
-/** What is held after a frame, beside what the server announced for it. */
 /** After so many snapshots in a row that do not fit the next one is asked for later [tenths of a second]. */
 const MOST_MISFITS = 3;
 const ASK_PAUSE = 50;
 
+/** What is held after a frame, beside what the server announced for it. */
 export interface Applied {
   sequence: number;
   revision: number;
