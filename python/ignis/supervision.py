@@ -28,7 +28,8 @@ now=$(date +%s)
 for stamp in $(s6-svdt . | cut -c2-17); do
   # TAI64: seconds since 1970 plus 2^62 plus 10.
   age=$((now - (0x$stamp - 0x400000000000000a)))
-  [ $age -lt 0 ] || [ $age -ge 60 ] || deaths=$((deaths + 1))
+  # Further ahead than leap seconds: the clock was set back since.
+  [ $age -le -60 ] || [ $age -ge 60 ] || deaths=$((deaths + 1))
 done
 case $deaths in 0 | 1 | 2 | 3) pause=0 ;; 4) pause=2 ;; 5) pause=5 ;; *) pause=10 ;; esac
 if [ $pause -gt 0 ]; then
