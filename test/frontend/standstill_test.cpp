@@ -37,7 +37,8 @@ FilterState resting_state() {
   FilterState filter;
   filter.nominal.utime = 1'000'000;
   filter.covariance.diagonal() << Eigen::Vector3d::Constant(1e-4), Eigen::Vector3d::Constant(1e-4),
-      Eigen::Vector3d::Constant(4e-4), Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-3);
+      Eigen::Vector3d::Constant(4e-4), Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-3),
+      Eigen::Vector2d::Constant(1e-4);
   return filter;
 }
 
