@@ -226,7 +226,13 @@ ScanResult Lio::process(const Scan& scan) {
   match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(match.stats.reason);
   enter_map(cloud, match);
+  return result_of(scan, match, std::move(cloud), std::move(sparse));
+}
 
+/// What is told of a scan, once the filter has taken it: states and covariance as published, and the keyframe if one is
+/// due.
+ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vector<CloudPoint> cloud,
+                          std::vector<CloudPoint> sparse) {
   ScanResult result;
   result.stats = match.stats;
   result.stats.utime = scan.end_utime();

@@ -64,8 +64,8 @@ class Lio {
   /// Forgets everything and starts a new session.
   void reset();
 
-  /// After its state has been read back from bytes (see checkpoint.h): the time since then is a gap that the next
-  /// samples close, and scans are searched for widely. Until ten of them have confirmed the pose none enters the map,
+  /// After its state has been read back from bytes (see checkpoint.h): speed and turn rate go on over the time since
+  /// then, and scans are searched for widely. Until ten of them have confirmed the pose none enters the map,
   /// no keyframe is made, and three in a row that contradict take back what the others said. A new session begins when
   /// the gap is too long or the confirmation does not come.
   void resume();
@@ -87,6 +87,8 @@ class Lio {
  private:
   [[nodiscard]] std::vector<ScanResult> process_pending();
   [[nodiscard]] ScanResult process(const Scan& scan);
+  [[nodiscard]] ScanResult result_of(const Scan& scan, const MatchResult& match, std::vector<CloudPoint> cloud,
+                                     std::vector<CloudPoint> sparse);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
@@ -106,7 +108,7 @@ class Lio {
   void start(const FilterState& first);
   void give_up_resumption();
   void close_gap(Utime first_sample);
-  enum class Silence : std::int8_t { kNone, kBridged, kTooLong };
+  enum class Silence : std::int8_t { kNone, kBridged, kTooLong };  ///< of both streams: what became of it
   [[nodiscard]] Silence bridge_silence(Utime before, Utime sample, std::vector<ScanResult>& refused);
   void seek_confirmation(ScanReason reason);
   void rebuild_live_state();

@@ -2,26 +2,20 @@
 #include "frontend/plane_fit.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "frontend/scatter_axes.h"
 
 namespace ignis {
-namespace {
 
-constexpr std::size_t kTogether = 4;  // see scatter_axes
-
-Eigen::Matrix3d scatter_of(const NeighbourMoments& moments) {
-  const double inverse_count = 1.0 / moments.count;
-  const Eigen::Vector3d mean = moments.sum * inverse_count;
-  return moments.sum_outer * inverse_count - mean * mean.transpose();
-}
-
-PlaneFit judged(const NeighbourMoments& moments, const ScatterAxes& axes, const FrontendConfig& config, double radius) {
+PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config, double radius) {
   PlaneFit fit;
+  if (moments.count < config.min_plane_points) return fit;
+
   const double inverse_count = 1.0 / moments.count;
   fit.offset = moments.sum * inverse_count;
+  const Eigen::Matrix3d scatter = moments.sum_outer * inverse_count - fit.offset * fit.offset.transpose();
+  const ScatterAxes axes = scatter_axes(scatter);
   const Eigen::Vector3d lambda = axes.values.cwiseMax(0.0);
   fit.normal = axes.vectors.col(0);
   fit.count = moments.count;
@@ -45,36 +39,6 @@ PlaneFit judged(const NeighbourMoments& moments, const ScatterAxes& axes, const 
     fit.normal_sigma.col(1) = std::sqrt(across / lambda[2]) * axes.vectors.col(2);
   }
   return fit;
-}
-
-}  // namespace
-
-PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config, double radius) {
-  if (moments.count < config.min_plane_points) return {};
-  return judged(moments, scatter_axes(scatter_of(moments)), config, radius);
-}
-
-void fit_planes(std::span<const NeighbourMoments> neighbourhoods, const FrontendConfig& config, double radius,
-                std::vector<PlaneFit>& planes) {
-  planes.assign(neighbourhoods.size(), {});
-  std::array<Eigen::Matrix3d, kTogether> scatters;
-  std::array<std::size_t, kTogether> places{};
-  std::size_t waiting = 0;
-  const auto fit_waiting = [&] {
-    std::array<ScatterAxes, kTogether> axes;
-    scatter_axes(std::span(scatters).first(waiting), axes);
-    for (std::size_t i = 0; i < waiting; ++i) {
-      planes[places[i]] = judged(neighbourhoods[places[i]], axes[i], config, radius);
-    }
-    waiting = 0;
-  };
-  for (std::size_t i = 0; i < neighbourhoods.size(); ++i) {
-    if (neighbourhoods[i].count < config.min_plane_points) continue;
-    scatters[waiting] = scatter_of(neighbourhoods[i]);
-    places[waiting] = i;
-    if (++waiting == kTogether) fit_waiting();
-  }
-  fit_waiting();
 }
 
 }  // namespace ignis

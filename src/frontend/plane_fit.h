@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include <Eigen/Core>
 
 #include "frontend/frontend_config.h"
@@ -51,9 +48,5 @@ struct PlaneFit {
 [[nodiscard]] inline PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config) {
   return fit_plane(moments, config, config.match_radius_m);
 }
-
-/// The same, to the bit, for many neighbourhoods: replaces `planes` by one for each.
-void fit_planes(std::span<const NeighbourMoments> neighbourhoods, const FrontendConfig& config, double radius,
-                std::vector<PlaneFit>& planes);
 
 }  // namespace ignis

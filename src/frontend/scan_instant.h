@@ -18,7 +18,8 @@ namespace ignis {
 /// Variance of the velocity [m^2/s^2], sum over the axes.
 [[nodiscard]] double velocity_variance(const ErrorCovariance& covariance);
 
-/// Share of the velocity's variance that has come since the map was made, from 0 to 1.
+/// Share of the velocity's variance that has come since the map was made, from 0 to 1. The map's scans were shifted by
+/// the error that the velocity had then, so that part cancels; only the new one moves a scan against the map.
 [[nodiscard]] double new_share(const ErrorCovariance& covariance, double mapped_velocity_variance);
 
 /// The covariance with the position error, dp, replaced by dp + seconds * dv. Negative seconds lead to an earlier

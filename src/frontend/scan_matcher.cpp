@@ -121,7 +121,10 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
 void ScanMatcher::find_planes(const LocalMap& map) {
   lonely_.clear();
   lonely_at_.clear();
-  fit_planes(search_.gather(map, queries_, config_.match_radius_m), config_, config_.match_radius_m, planes_);
+  planes_.clear();
+  for (const NeighbourMoments& moments : search_.gather(map, queries_, config_.match_radius_m)) {
+    planes_.push_back(fit_plane(moments, config_));
+  }
   // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
   // where it is not.
   const double radius = config_.wide_match_radius_m;
@@ -131,8 +134,8 @@ void ScanMatcher::find_planes(const LocalMap& map) {
     lonely_.push_back(queries_[i]);
     lonely_at_.push_back(i);
   }
-  fit_planes(search_.gather(map, lonely_, radius), wide_config_, radius, wide_planes_);
-  for (std::size_t i = 0; i < wide_planes_.size(); ++i) planes_[lonely_at_[i]] = wide_planes_[i];
+  const std::span<const NeighbourMoments> wide = search_.gather(map, lonely_, radius);
+  for (std::size_t i = 0; i < wide.size(); ++i) planes_[lonely_at_[i]] = fit_plane(wide[i], wide_config_, radius);
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {

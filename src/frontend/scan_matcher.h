@@ -100,7 +100,6 @@ class ScanMatcher {
   std::vector<PlaneFit> planes_;          ///< [query]
   std::vector<Eigen::Vector3d> lonely_;   ///< those of queries_ with too few neighbours
   std::vector<std::size_t> lonely_at_;    ///< their places in queries_
-  std::vector<PlaneFit> wide_planes_;     ///< their planes
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;

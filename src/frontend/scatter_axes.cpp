@@ -2,7 +2,6 @@
 #include "frontend/scatter_axes.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -10,40 +9,29 @@
 namespace ignis {
 namespace {
 
-constexpr std::size_t kTogether = 4;
 constexpr int kMaxSteps = 40;
 constexpr double kConverged = 1e-8;  // of the trace: the step after it would be of the order of its square
 constexpr double kParallel = 1e-20;  // squared sine between rows that say nothing about their normal
 constexpr double kNothing = 1e-300;  // a trace that is none
 
-/// Four numbers side by side.
-using Lanes = double __attribute__((vector_size(32)));
-
-/// Smallest eigenvalues of four matrices of trace 1 by their sums of principal minors and determinants. Each step waits
-/// for a division: four wait together.
-void smallest_roots(const Lanes& minors, const Lanes& determinant, Lanes& root) {
-  root = Lanes{};
-  auto is_open = root == root;
+/// Smallest eigenvalue of a matrix of trace 1.
+double smallest_root(const Eigen::Matrix3d& A) {
+  const double minors = A(0, 0) * A(1, 1) - A(0, 1) * A(0, 1) + A(0, 0) * A(2, 2) - A(0, 2) * A(0, 2) +
+                        A(1, 1) * A(2, 2) - A(1, 2) * A(1, 2);
+  const double determinant = A(0, 0) * (A(1, 1) * A(2, 2) - A(1, 2) * A(1, 2)) -
+                             A(0, 1) * (A(0, 1) * A(2, 2) - A(1, 2) * A(0, 2)) +
+                             A(0, 2) * (A(0, 1) * A(1, 2) - A(1, 1) * A(0, 2));
+  double root = 0.0;
   for (int step = 0; step < kMaxSteps; ++step) {
     // det(A - x I) = determinant - minors x + x^2 - x^3
-    const Lanes value = determinant + root * (-minors + root * (1.0 - root));
-    const Lanes slope = -minors + root * (2.0 - 3.0 * root);
-    is_open &= (slope < 0.0) & (value > 0.0);
-    const Lanes change = is_open ? -value / slope : Lanes{};
+    const double value = determinant + root * (-minors + root * (1.0 - root));
+    const double slope = -minors + root * (2.0 - 3.0 * root);
+    if (!(slope < 0.0) || !(value > 0.0)) break;
+    const double change = -value / slope;
     root += change;
-    is_open &= ~(change < kConverged);
-    if ((is_open[0] | is_open[1] | is_open[2] | is_open[3]) == 0) break;
+    if (change < kConverged) break;
   }
-}
-
-double sum_of_minors(const Eigen::Matrix3d& A) {
-  return A(0, 0) * A(1, 1) - A(0, 1) * A(0, 1) + A(0, 0) * A(2, 2) - A(0, 2) * A(0, 2) + A(1, 1) * A(2, 2) -
-         A(1, 2) * A(1, 2);
-}
-
-double determinant(const Eigen::Matrix3d& A) {
-  return A(0, 0) * (A(1, 1) * A(2, 2) - A(1, 2) * A(1, 2)) - A(0, 1) * (A(0, 1) * A(2, 2) - A(1, 2) * A(0, 2)) +
-         A(0, 2) * (A(0, 1) * A(1, 2) - A(1, 1) * A(0, 2));
+  return root;
 }
 
 Eigen::Vector3d across(const Eigen::Vector3d& direction) {
@@ -62,8 +50,13 @@ Eigen::Vector3d null_vector(const Eigen::Matrix3d& M) {
   return length2 > 0.0 ? across(M.col(longest)) : Eigen::Vector3d::UnitX();
 }
 
-/// The axes of a scatter matrix of this trace, whose share A of it has this smallest eigenvalue.
-ScatterAxes axes_by_smallest(const Eigen::Matrix3d& A, double trace, double smallest) {
+}  // namespace
+
+ScatterAxes scatter_axes(const Eigen::Matrix3d& scatter) {
+  const double trace = scatter.trace();
+  if (!(trace > kNothing)) return {Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()};
+  const Eigen::Matrix3d A = scatter / trace;
+  const double smallest = smallest_root(A);
   const Eigen::Vector3d normal = null_vector(A - smallest * Eigen::Matrix3d::Identity());
 
   const Eigen::Vector3d u = across(normal);
@@ -83,37 +76,6 @@ ScatterAxes axes_by_smallest(const Eigen::Matrix3d& A, double trace, double smal
   axes.values = trace * Eigen::Vector3d(smallest, mean - radius, mean + radius);
   axes.vectors << normal, major.x() * v - major.y() * u, major.x() * u + major.y() * v;
   return axes;
-}
-
-}  // namespace
-
-ScatterAxes scatter_axes(const Eigen::Matrix3d& scatter) {
-  ScatterAxes axes;
-  scatter_axes({&scatter, 1}, {&axes, 1});
-  return axes;
-}
-
-void scatter_axes(std::span<const Eigen::Matrix3d> scatters, std::span<ScatterAxes> axes) {
-  for (std::size_t begin = 0; begin < scatters.size(); begin += kTogether) {
-    const std::size_t count = std::min(kTogether, scatters.size() - begin);
-    std::array<Eigen::Matrix3d, kTogether> A;
-    std::array<double, kTogether> traces{};
-    Lanes minors{};
-    Lanes determinants{};
-    for (std::size_t i = 0; i < count; ++i) {
-      traces[i] = scatters[begin + i].trace();
-      A[i] = scatters[begin + i] / traces[i];
-      minors[i] = sum_of_minors(A[i]);
-      determinants[i] = determinant(A[i]);
-    }
-    Lanes smallest;
-    smallest_roots(minors, determinants, smallest);
-    for (std::size_t i = 0; i < count; ++i) {
-      const bool is_extended = traces[i] > kNothing;
-      axes[begin + i] = is_extended ? axes_by_smallest(A[i], traces[i], smallest[i])
-                                    : ScatterAxes{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()};
-    }
-  }
 }
 
 }  // namespace ignis

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <span>
-
 #include <Eigen/Core>
 
 namespace ignis {
@@ -21,8 +19,5 @@ struct ScatterAxes {
 /// the problem is 2x2. Accurate to about 1e-14 of the trace where the smallest value stands apart. Where all three are
 /// nearly equal the steps only halve the distance; they end after 40, with the vectors still orthogonal.
 [[nodiscard]] ScatterAxes scatter_axes(const Eigen::Matrix3d& scatter);
-
-/// The same, to the bit, for many matrices, four side by side. `axes` has a place for each.
-void scatter_axes(std::span<const Eigen::Matrix3d> scatters, std::span<ScatterAxes> axes);
 
 }  // namespace ignis

@@ -60,36 +60,6 @@ TEST(PlaneFit, SigmaOfTheNormalMatchesSampledErrors) {
   EXPECT_NEAR(claimed(1, 1) / sampled(1, 1), 1.0, 0.15);
 }
 
-TEST(PlaneFit, IsTheSameToTheBitWhenManyAreFittedTogether) {
-  const FrontendConfig config;
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> uniform(-0.4, 0.4);
-  std::vector<NeighbourMoments> neighbourhoods(1);  // the first is empty
-  for (int i = 0; i < 200; ++i) {
-    NeighbourMoments& moments = neighbourhoods.emplace_back();
-    const double thickness = i % 5 == 0 ? 1.0 : 0.01;  // some are no planes
-    for (int k = 0; k < i % 12; ++k) {
-      moments.add({uniform(random), thickness * uniform(random), uniform(random)}, uniform(random));
-    }
-  }
-  neighbourhoods.push_back({.count = 9});  // all points in one place
-  std::vector<PlaneFit> planes(3);
-  fit_planes(neighbourhoods, config, 0.5, planes);
-  ASSERT_EQ(planes.size(), neighbourhoods.size());
-  int found = 0;
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    const PlaneFit alone = fit_plane(neighbourhoods[i], config, 0.5);
-    ASSERT_EQ(planes[i].verdict, alone.verdict) << i;
-    ASSERT_EQ(planes[i].normal, alone.normal);
-    ASSERT_EQ(planes[i].offset, alone.offset);
-    ASSERT_EQ(planes[i].normal_sigma, alone.normal_sigma);
-    ASSERT_EQ(planes[i].scatter, alone.scatter);
-    ASSERT_EQ(planes[i].mean_scan, alone.mean_scan);
-    found += alone.verdict == PlaneVerdict::kPlane ? 1 : 0;
-  }
-  EXPECT_GT(found, 30);
-}
-
 TEST(PlaneFit, RefusesTooFewPoints) {
   NeighbourMoments moments;
   for (int i = 0; i < 4; ++i) moments.add({0.1 * (i % 2), 0.1 * (i / 2), 0.0});

@@ -94,7 +94,7 @@ TEST(Standstill, DerivativeOfTheEarlierVelocityIsTheNumericalOne) {
   const FilterState filter = correlated_state();
   const auto at = find_standstill(samples, filter, FrontendConfig{});
   ASSERT_TRUE(at);
-  for (int i = 0; i < 15; ++i) {
+  for (int i = 0; i < kErrorSize; ++i) {
     constexpr double kStep = 1e-6;
     FilterState moved = filter;
     moved.nominal = perturbed(filter.nominal, kStep * ErrorVector::Unit(i));

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A driver that hangs: neither inertial samples nor scans come for a while, and the vehicle drives on.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+
+#include "frontend/fault_drive.h"
+
+namespace ignis {
+namespace {
+
+using test::Drive;
+using test::drive;
+using test::sample_at;
+
+/// Each scan comes when the samples that cover it are there. Calls `look` after each.
+void feed(Lio& lio, const Drive& input, const std::function<void(const ScanResult&)>& look) {
+  auto scan = input.scans.begin();
+  const auto show = [&](const std::vector<ScanResult>& results) { std::ranges::for_each(results, look); };
+  for (const ImuSample& sample : input.imu) {
+    show(lio.add_imu(sample).scans);
+    for (; scan != input.scans.end() && scan->end_utime() <= sample.utime; ++scan) show(lio.add_scan(*scan));
+  }
+}
+
+TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnannouncedError) {
+  for (const double seconds : {0.25, 0.5, 1.0, 2.0, 2.9, 4.0}) {
+    Drive input = drive();
+    const Utime from = sample_at(input, 8.0)->utime;
+    const Utime to = from + to_micros(seconds);
+    std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+    std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+    Lio lio(test::tuned_config());
+    double error = 0.0;
+    int unannounced = 0;
+    bool was_lost = false;
+    feed(lio, input, [&](const ScanResult& scan) {
+      if (!scan.has_state) return;
+      const Pose truth = drive().truth(test::drive_seconds(drive(), scan.stats.utime));
+      error = (scan.state.T_odom_body.translation - truth.translation).norm();
+      was_lost = was_lost || lio.status().trust == Trust::kLost || scan.stats.session > 0;
+      unannounced += error > 0.5 && !was_lost && lio.status().trust == Trust::kOk ? 1 : 0;
+    });
+    EXPECT_EQ(unannounced, 0) << seconds;
+    if (seconds <= 2.0) {
+      EXPECT_LT(error, 0.3) << seconds;
+    }
+    if (seconds > 3.0) {
+      EXPECT_NE(lio.status().reason.find("neither IMU data nor scans"), std::string::npos);
+    }
+  }
+}
+
+/// A drive without data between 8 s and 8 s + `seconds`; a scan that had just ended waits for its samples if `waiting`.
+Drive silent(double seconds, bool waiting) {
+  Drive input = drive();
+  const Utime from = sample_at(input, 8.0)->utime;
+  const Utime to = from + to_micros(seconds);
+  std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+  std::erase_if(input.scans,
+                [&](const Scan& scan) { return scan.end_utime() >= from + (waiting ? 50'000 : 0) && scan.utime < to; });
+  return input;
+}
+
+TEST(Fault_P7, TheStateGoesOnOverASilenceOnceAndNotTwice) {
+  for (const bool waiting : {false, true}) {
+    const Drive input = silent(0.9, waiting);
+    const Utime to = drive().imu.front().utime + to_micros(8.9);
+    Lio lio(test::tuned_config());
+    auto scan = input.scans.begin();
+    std::optional<NavState> after;
+    int refused = 0;
+    for (const ImuSample& sample : input.imu) {
+      const ImuResult result = lio.add_imu(sample);
+      for (const ScanResult& each : result.scans) refused += each.stats.reason == ScanReason::kNoImu ? 1 : 0;
+      if (sample.utime >= to) {
+        after = result.state;
+        break;
+      }
+      for (; scan != input.scans.end() && scan->utime <= sample.utime; ++scan) (void)lio.add_scan(*scan);
+    }
+    ASSERT_TRUE(after.has_value());
+    const Pose truth = drive().truth(test::drive_seconds(drive(), after->utime));
+    EXPECT_LT((after->T_odom_body.translation - truth.translation).norm(), 0.4) << "0.9 s at 1.3 m/s, in a curve";
+    EXPECT_EQ(refused, waiting ? 1 : 0) << "its samples never came";
+  }
+}
+
+TEST(Fault_P7, ASilenceBeforeTheFirstScanLosesNothing) {
+  Drive input = silent(0.5, false);
+  const Utime first = drive().imu.front().utime + to_micros(9.0);
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.utime < first; });
+  Lio lio(test::tuned_config());
+  int applied = 0;
+  feed(lio, input, [&](const ScanResult& scan) { applied += scan.stats.applied() ? 1 : 0; });
+  EXPECT_EQ(lio.session(), 0);
+  EXPECT_GT(applied, 50);
+}
+
+TEST(Fault_P7, ASilenceIsBridgedWhenARestartMayNotGoOn) {
+  FrontendConfig config = test::tuned_config();
+  config.resume_max_gap_s = 0.0;
+  Lio lio(config);
+  feed(lio, silent(0.5, false), [](const ScanResult&) {});
+  EXPECT_EQ(lio.session(), 0);
+}
+
+TEST(Fault_P7, AStampOfTheFarFutureWhileScansHaveYetToConfirmThePlaceEndsNothing) {
+  const Drive input = silent(0.5, false);
+  const Utime to = drive().imu.front().utime + to_micros(8.5);
+  Lio lio(test::tuned_config());
+  feed(lio, input, [&](const ScanResult& scan) {
+    if (scan.stats.utime < to || scan.stats.utime > to + 200'000) return;
+    ImuSample sample = input.imu.back();
+    sample.utime += 3'600'000'000;
+    EXPECT_NE(lio.add_imu(sample).fault, ImuFault::kNone);
+  });
+  EXPECT_EQ(lio.session(), 0);
+}
+
+}  // namespace
+}  // namespace ignis
