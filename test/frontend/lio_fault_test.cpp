@@ -75,9 +75,30 @@ TEST(Fault_F3, AClippedAxisTeachesTheBiasesNothing) {
     return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
   };
   EXPECT_EQ((state_at(9.0).accel_bias - state_at(7.95).accel_bias).norm(), 0.0);
+  EXPECT_EQ((state_at(9.0).gravity_tilt - state_at(7.95).gravity_tilt).norm(), 0.0);
   EXPECT_GT((state_at(9.5).accel_bias - state_at(7.95).accel_bias).norm(), 0.0) << "one second later it learns again";
   for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
   EXPECT_LT(run.error_at_end(), 0.3);
+}
+
+TEST(Fault_F3, TheScanThatCorrectsAWrongVelocityIsDeskewedWithTheRightOne) {
+  Drive input = drive();
+  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
+    sample->accel.x() = 25.0;
+    sample->saturated = true;
+  }
+  const Watched clean(drive());
+  const Watched clipped(input);
+  ASSERT_EQ(clean.scans.size(), clipped.scans.size());
+  for (std::size_t i = 0; i < clean.scans.size(); ++i) {
+    const std::vector<CloudPoint>& expected = clean.scans[i].cloud;
+    const std::vector<CloudPoint>& actual = clipped.scans[i].cloud;
+    ASSERT_EQ(expected.size(), actual.size()) << i;
+    Eigen::Vector3f shift = Eigen::Vector3f::Zero();
+    for (std::size_t k = 0; k < expected.size(); ++k) shift += actual[k].position - expected[k].position;
+    EXPECT_LT(shift.norm() / static_cast<float>(std::max<std::size_t>(expected.size(), 1)), 0.015F)
+        << "scan " << i << "; 25 ms at the 1.3 m/s that the velocity was off by are 33 mm";
+  }
 }
 
 TEST(Fault_F3, StandingAfterAClippedSampleTeachesTheBiasesNothingEither) {

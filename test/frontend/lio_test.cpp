@@ -158,6 +158,20 @@ TEST(Lio, MovingStartAtTenMetresPerSecond) {
   }
 }
 
+TEST(Lio, AMovingStartCountsItsWayFromTheFirstScanAndNotFromTheFirstSample) {
+  Sensors sensors;
+  sensors.car = true;
+  sensors.max_range = 80.0;
+  Drive drive = test::simulate(test::street(), test::straight_drive(0.0, 10.0), 3.0, sensors, 2);
+  const Utime late = drive.imu.front().utime + to_micros(1.2);
+  std::erase_if(drive.scans, [&](const Scan& scan) { return scan.utime < late; });
+  const LioRun run = run_lio(car_config(), drive);
+  const auto first = std::ranges::find_if(run.scans, [](const ScanResult& scan) { return scan.stats.applied(); });
+  ASSERT_NE(first, run.scans.end());
+  EXPECT_LT(first - run.scans.begin(), 3) << "two scans, 50 ms apart, tell the velocity";
+  EXPECT_LT((first->state.v_odom - Eigen::Vector3d(0.0, 0.0, -10.0)).norm(), 1.5);
+}
+
 void expect_same(const std::vector<ScanResult>& a, const std::vector<ScanResult>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
