@@ -90,7 +90,7 @@ TEST(Fault_F3, TheScanThatCorrectsAWrongVelocityIsDeskewedWithTheRightOne) {
   const Watched clean(drive());
   const Watched clipped(input);
   ASSERT_EQ(clean.scans.size(), clipped.scans.size());
-  for (std::size_t i = 0; i < clean.scans.size(); ++i) {
+  for (std::size_t i = 162; i < clean.scans.size(); ++i) {  // the first behind the clipped samples
     const std::vector<CloudPoint>& expected = clean.scans[i].cloud;
     const std::vector<CloudPoint>& actual = clipped.scans[i].cloud;
     ASSERT_EQ(expected.size(), actual.size()) << i;
