@@ -131,6 +131,23 @@ TEST(Lio, CorridorLeavesItsAxisToTheImuAndSaysSoAboveTheThreshold) {
   EXPECT_GT(P(5, 5), 20.0 * P(3, 3)) << "the axis of the corridor must not look observed";
 }
 
+TEST(Lio, PassesThroughADoorInAThinWallWithoutAStep) {
+  // The far face of the wall lies within the match radius of the face that the map knows.
+  test::World rooms = test::furnished_hall();
+  rooms.boxes = {{{rooms.room.lo.x(), rooms.room.lo.y(), -5.1}, {-0.6, rooms.room.hi.y(), -4.9}},
+                 {{0.6, rooms.room.lo.y(), -5.1}, {rooms.room.hi.x(), rooms.room.hi.y(), -4.9}}};
+  rooms.pillars.clear();
+  const Drive drive = test::simulate(rooms, test::straight_drive(3.0, 0.7), 12.5, Sensors{}, 3);
+  const LioRun run = run_lio(test::tuned_config(), drive);
+  double largest = 0.0;
+  for (const ScanResult& scan : run.scans) {
+    if (!scan.has_state) continue;
+    const Pose truth = drive.truth(test::drive_seconds(drive, scan.state.utime));
+    largest = std::max(largest, std::abs((scan.state.T_odom_body.translation - truth.translation).z()));
+  }
+  EXPECT_LT(largest, 0.05);
+}
+
 TEST(Lio, MovingStartAtTenMetresPerSecond) {
   Sensors sensors;
   sensors.car = true;
