@@ -110,8 +110,8 @@ BENCHMARK(drive)
     ->Args({2000, 27, 0})
     ->Args({10000, 27, 0})
     ->Args({2000, 27, 12000})
+    ->Args({2000, 9, 12000})
     ->Args({10000, 27, 12000})
-    ->Args({10000, 9, 12000})
     ->Iterations(1)
     ->Unit(benchmark::kSecond);
 
