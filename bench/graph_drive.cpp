@@ -28,6 +28,12 @@ using namespace ignis;
 using bench::processor_ms;
 using bench::quantile;
 
+/// The newest keyframe as it was published.
+struct NewestPose {
+  Pose T_map_body;
+  Matrix6d covariance;
+};
+
 /// The back end over one session's keyframes.
 class Drive {
  public:
@@ -37,10 +43,11 @@ class Drive {
     const double began = processor_ms();
     const SmootherUpdate update = smoother_.add_keyframe(keyframe);
     times_ms_.push_back(processor_ms() - began);
+    journal_bytes_ += static_cast<double>(smoother_.take_change().size());
     odometry_.push_back({keyframe.state.utime, keyframe.state.T_odom_body});
     if (!update.accepted()) return;
     stamps_.push_back(keyframe.state.utime);
-    newest_.push_back(update);
+    newest_.push_back({update.newest.T_odom_body, update.covariance});
     if (update.loop) note(*update.loop);
     for (const LoopResult& changed : update.changed) note(changed);
   }
@@ -56,6 +63,7 @@ class Drive {
             {"waiting", stats.loops_waiting},
             {"withdrawn", stats.loops_withdrawn},
             {"kB_per_keyframe", (bench::resident_bytes() - bytes_before_) / 1e3 / std::max(1, stats.keyframes)},
+            {"journal_kB_per_keyframe", journal_bytes_ / 1e3 / std::max(1, stats.keyframes)},
             {"cpu_s", sum / 1e3},
             {"cpu_ms_per_drive_s", sum / std::max(seconds, 1e-9)},
             {"p50_ms", quantile(times_ms_, 0.5)},
@@ -94,7 +102,7 @@ class Drive {
     std::ofstream out(file);
     out << "utime,x,y,z,qx,qy,qz,qw,covariance\n";
     for (std::size_t i = 0; i < newest_.size(); ++i) {
-      const Pose& pose = newest_[i].newest.T_odom_body;
+      const Pose& pose = newest_[i].T_map_body;
       const Eigen::Vector3d& t = pose.translation;
       const Eigen::Vector4d q = pose.rotation.coeffs();
       out << std::format("{},{},{},{},{},{},{},{}", stamps_[i], t.x(), t.y(), t.z(), q(0), q(1), q(2), q(3));
@@ -107,10 +115,11 @@ class Drive {
 
   double bytes_before_ = bench::resident_bytes();
   Smoother smoother_;
+  double journal_bytes_ = 0.0;
   std::vector<double> times_ms_;
   Trajectory odometry_;
   std::vector<Utime> stamps_;
-  std::vector<SmootherUpdate> newest_;
+  std::vector<NewestPose> newest_;
   std::vector<std::string> loop_lines_;
 };
 

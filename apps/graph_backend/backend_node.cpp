@@ -214,6 +214,15 @@ void BackendNode::publish_health() {
   } else if (!inbox_.empty()) {
     link_.report_health(newest_utime_, health_t::DEGRADED,
                         std::format("waiting for keyframe {}", graph_.smoother().expected_id()));
+  } else if (stats.clouds_unreadable > 0) {
+    link_.report_health(newest_utime_, health_t::DEGRADED,
+                        std::format("{} times the journal did not give a cloud back, and a loop was refused for it",
+                                    stats.clouds_unreadable));
+  } else if (stats.clouds_forgotten > 0) {
+    link_.report_health(newest_utime_, health_t::OK,
+                        std::format("OK: without a journal {} clouds beyond backend.cloud_memory_mb were dropped; "
+                                    "no loop ends there",
+                                    stats.clouds_forgotten));
   } else if (stats.shadow_checks > 0) {
     link_.report_health(newest_utime_, health_t::OK,
                         std::format("OK: {:.1f} mm and {:.2f} mrad from the batch optimum at most; swapped {} times",

@@ -10,29 +10,34 @@
 #include <string>
 #include <vector>
 
+#include <boost/interprocess/mapped_region.hpp>
+
 #include "backend/journal.h"
+#include "backend/record_archive.h"
 
 namespace ignis {
 
-/// The bytes of a journal and what they hold; `contents` points into `bytes`.
+/// The bytes of a journal, in the page cache rather than in memory of its own, and what they hold.
 struct LoadedJournal {
-  std::vector<std::byte> bytes;
-  JournalContents contents;
+  boost::interprocess::mapped_region file;
+  JournalContents contents;  ///< points into `file`
 
-  /// Where the first `records` of them end.
+  [[nodiscard]] std::span<const std::byte> bytes() const;
+  /// Where the head and the first `records` end.
   [[nodiscard]] std::size_t end_of(std::size_t records) const;
 };
 
 /// The file DIR/graph_backend.journal, which one process at a time may use. A record is handed to the kernel at once,
 /// so a killed process loses none; it is on the disk within kSyncPeriod, so a power cut loses no more than that.
-/// Records that cannot be written (disk full) wait in memory and are tried again; the graph goes on.
-class JournalFile {
+/// Records that cannot be written (disk full) wait in memory and are tried again; the graph goes on. Records are read
+/// back from wherever they are.
+class JournalFile : public RecordArchive {
  public:
   static constexpr std::chrono::seconds kSyncPeriod{5};
 
   /// Makes the folder and locks it. Throws runtime::UserError that names folder and reason.
   explicit JournalFile(std::filesystem::path folder);
-  ~JournalFile();
+  ~JournalFile() override;
   JournalFile(const JournalFile&) = delete;
   JournalFile& operator=(const JournalFile&) = delete;
 
@@ -45,12 +50,14 @@ class JournalFile {
   /// Begins anew. What was there is set aside.
   void begin(const JournalHead& head);
 
-  /// Goes on behind the first `size` bytes of what is there. The rest is cut off; with `keep_copy` the whole file is
-  /// copied beside it before.
-  void resume(std::size_t size, bool keep_copy);
+  /// Goes on behind the first `records` of what load() has found. The rest is cut off; with `keep_copy` the whole file
+  /// is copied beside it before.
+  void resume(const LoadedJournal& loaded, std::size_t records, bool keep_copy);
 
   /// Adds a record. What goes wrong shows in failure().
   void append(std::span<const std::byte> payload);
+
+  [[nodiscard]] std::optional<std::vector<std::byte>> read(std::size_t number) const override;
 
   /// Tries again what could not be written, and syncs when it is time.
   void maintain();
@@ -61,7 +68,10 @@ class JournalFile {
 
  private:
   void open(int flags, std::size_t size);
+  void add_pending(std::span<const std::byte> bytes);
   void write_pending();
+  /// All of them, or false.
+  [[nodiscard]] bool read_file(std::size_t offset, std::span<std::byte> bytes) const;
   void fail(const std::string& what, int error);
   [[nodiscard]] std::filesystem::path free_name(const char* suffix) const;
 
@@ -70,6 +80,8 @@ class JournalFile {
   int file_ = -1;
   std::size_t size_ = 0;            ///< of whole records in the file
   std::vector<std::byte> pending_;  ///< encoded, not yet in the file
+  /// Where the head ends, and each record, in the file and what is pending behind it.
+  std::vector<std::size_t> ends_;
   bool given_up_ = false;
   bool unsynced_ = false;
   std::chrono::steady_clock::time_point last_sync_{};

@@ -11,6 +11,7 @@ namespace {
 std::string graph_fingerprint(const runtime::IgnisConfig& config) {
   runtime::IgnisConfig deciding;
   deciding.backend = config.backend;
+  deciding.backend.cloud_memory_mb = BackendConfig().cloud_memory_mb;  // clouds look the same from wherever they come
   deciding.frontend.loop_gates = config.frontend.loop_gates;
   return runtime::config_hash(deciding);
 }
@@ -18,10 +19,11 @@ std::string graph_fingerprint(const runtime::IgnisConfig& config) {
 }  // namespace
 
 LastingGraph::LastingGraph(const runtime::IgnisConfig& config, const std::filesystem::path& journal_folder)
-    : config_(config), fingerprint_(graph_fingerprint(config)), smoother_(config.backend, config.frontend.loop_gates) {
-  if (journal_folder.empty()) return;
-  journal_ = std::make_unique<JournalFile>(journal_folder);
-  resume();
+    : config_(config),
+      fingerprint_(graph_fingerprint(config)),
+      journal_(journal_folder.empty() ? nullptr : std::make_unique<JournalFile>(journal_folder)),
+      smoother_(config.backend, config.frontend.loop_gates, journal_.get()) {
+  if (journal_) resume();
 }
 
 void LastingGraph::resume() {
@@ -42,14 +44,15 @@ void LastingGraph::resume() {
     put_aside("it was written under another configuration");
     return;
   }
-  SmootherRestoration restoration = restore_smoother(config_.backend, config_.frontend.loop_gates, contents.payloads);
+  SmootherRestoration restoration =
+      restore_smoother(config_.backend, config_.frontend.loop_gates, contents.payloads, journal_.get());
   if (restoration.records_used == 0 && !contents.payloads.empty()) {
     put_aside("its graph cannot be built: " + restoration.problem);
     return;
   }
   const std::size_t end = loaded->end_of(restoration.records_used);
   const bool lost_records = !restoration.problem.empty() || (!contents.damage.empty() && !contents.torn_tail);
-  journal_->resume(end, lost_records);
+  journal_->resume(*loaded, restoration.records_used, lost_records);
   smoother_ = std::move(restoration.smoother);
   session_ = contents.head.session;
   const SmootherStats stats = smoother_.stats();
@@ -57,9 +60,9 @@ void LastingGraph::resume() {
   resume_note_ =
       std::format("resumed {} keyframes, {} loops, revision {} of session {} from {} in {:.2f} s", stats.keyframes,
                   stats.loops_kept, smoother_.revision(), session_, journal_->path().string(), spent.count());
-  if (end == loaded->bytes.size()) return;
+  if (end == loaded->bytes().size()) return;
   const std::string why = restoration.problem.empty() ? contents.damage : restoration.problem;
-  resume_note_ += std::format("; its last {} bytes are left out ({}){}", loaded->bytes.size() - end, why,
+  resume_note_ += std::format("; its last {} bytes are left out ({}){}", loaded->bytes().size() - end, why,
                               lost_records ? "; the file as it was is kept beside it" : "");
 }
 
@@ -71,7 +74,7 @@ void LastingGraph::put_aside(const std::string& reason) {
 
 void LastingGraph::begin_session(std::int32_t session) {
   session_ = session;
-  smoother_ = Smoother(config_.backend, config_.frontend.loop_gates);
+  smoother_ = Smoother(config_.backend, config_.frontend.loop_gates, journal_.get());
   if (journal_) journal_->begin({kJournalVersion, fingerprint_, session});
 }
 

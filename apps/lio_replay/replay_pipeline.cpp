@@ -6,15 +6,19 @@
 namespace ignis {
 namespace {
 
-BackendConfig with_loops(BackendConfig config, bool use_loops) {
+/// There is no journal to look up clouds in, and a replay shall find the loops of the vehicle, which has one.
+constexpr double kCloudMemoryMb = 1e6;
+
+BackendConfig for_replay(BackendConfig config, bool use_loops) {
   config.use_loop_closing = config.use_loop_closing && use_loops;
+  config.cloud_memory_mb = kCloudMemoryMb;
   return config;
 }
 
 }  // namespace
 
 ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener)
-    : backend_config_(with_loops(config.backend, use_loops)),
+    : backend_config_(for_replay(config.backend, use_loops)),
       loop_gates_(config.frontend.loop_gates),
       lio_(config.frontend.filter),
       smoother_(backend_config_, loop_gates_),

@@ -39,6 +39,7 @@ struct BackendConfig {
 
   // Loops.
   double cloud_voxel_m = 0.15;
+  double cloud_memory_mb = 256.0;
   bool use_loop_closing = true;
   int loop_min_spacing = 2;
   int loop_max_candidates = 3;
@@ -85,6 +86,8 @@ struct BackendConfig {
                  "sigma of the zero velocity of a keyframe that stood still");
     visit.number("cloud_voxel_m", self.cloud_voxel_m, {0.01, 2.0}, "m",
                  "of a keyframe's cloud one point per voxel is kept, in memory and in the journal");
+    visit.number("cloud_memory_mb", self.cloud_memory_mb, {0.1, 1e6}, "MB",
+                 "clouds in memory; others are read back from the journal, and forgotten where there is none");
     visit.flag("use_loop_closing", self.use_loop_closing, "false: smoothing only");
     visit.integer("loop_min_spacing", self.loop_min_spacing, {1, 1000}, "keyframes",
                   "fewest keyframes from one accepted loop to the next search");

@@ -47,42 +47,9 @@ void transfer(auto& io, FieldsOf<GraphNode> auto& node) {
   transfer(io, node.link);
 }
 
-void transfer(auto& io, FieldsOf<LoopResult> auto& result) {
-  io.number(result.utime);
-  io.number(result.keyframes);
-  io.number(result.candidates);
-  io.number(result.passed);
-  io.number(result.stage);
-  io.number(result.reason);
-  io.text(result.reason_text);
-  io.number(result.from_id);
-  io.number(result.to_id);
-  io.number(result.correction_m);
-  io.number(result.correction_rad);
-  io.number(result.mean_residual);
-  io.number(result.matched_fraction);
-  io.number(result.overlap);
-  io.number(result.chi_square);
-  io.number(result.chi_square_bound);
-  transfer(io, result.T_to_from);
-}
-
-void transfer(auto& io, FieldsOf<GraphLoop> auto& loop) {
-  transfer(io, loop.result);
-  io.matrix(loop.rows);
-  io.number(loop.number);
-  io.number(loop.entered_id);
-}
-
 void transfer(auto& io, FieldsOf<LoopVeto> auto& veto) {
   io.number(veto.from_id);
   io.number(veto.to_id);
-}
-
-void transfer(auto& io, FieldsOf<LoopLists> auto& lists) {
-  io.list(lists.loops);
-  io.list(lists.waiting);
-  io.list(lists.vetoes);
 }
 
 void transfer(auto& io, FieldsOf<SmootherStats> auto& stats) {
@@ -97,11 +64,10 @@ void transfer(auto& io, FieldsOf<SmootherStats> auto& stats) {
   io.number(stats.shadow_gap_rad);
 }
 
-/// Without the lists of loops, which change rarely. Poses follow from the solver, and what was published is published
-/// anew.
+/// Without loops and clouds. Poses follow from the solver, and what was published is published anew.
 void transfer(auto& io, FieldsOf<SmootherState> auto& state) {
   io.list(state.nodes);
-  io.list(state.clouds);
+  io.list(state.vetoes);
   transfer(io, state.stats);
   io.matrix(state.angular_rate);
   io.number(state.session);
@@ -121,7 +87,9 @@ void transfer(auto& io, FieldsOf<LinearisationPoint> auto& point) {
 
 void transfer(auto& io, FieldsOf<GraphChange> auto& change) {
   transfer(io, change.state);
-  io.maybe(change.loops);
+  io.list(change.clouds);
+  transfer(io, change.loops);
+  transfer(io, change.waiting);
   io.list(change.linearised);
 }
 
@@ -135,7 +103,15 @@ std::vector<std::byte> encoded(const Value& value) {
   return bytes;
 }
 
-LoopLists loops_of(const SmootherState& state) { return {state.loops, state.waiting, state.vetoes}; }
+void copy_scalars(const SmootherState& from, SmootherState& to) {
+  to.stats = from.stats;
+  to.angular_rate = from.angular_rate;
+  to.session = from.session;
+  to.expected_id = from.expected_id;
+  to.last_loop_id = from.last_loop_id;
+  to.next_loop_number = from.next_loop_number;
+  to.revision = from.revision;
+}
 
 bool is_same_place(const NavState& a, const NavState& b) {
   return a.T_odom_body.rotation.coeffs() == b.T_odom_body.rotation.coeffs() &&
@@ -149,8 +125,9 @@ std::size_t index_of(const std::vector<GraphNode>& nodes, std::int32_t id) {
 }
 
 /// Why the new nodes cannot follow the newest of `state`, or nothing.
-std::string chain_problem(const SmootherState& state, const SmootherState& news) {
-  if (news.nodes.size() != news.clouds.size()) return "as many clouds as keyframes are missing";
+std::string chain_problem(const SmootherState& state, const GraphChange& change) {
+  const SmootherState& news = change.state;
+  if (news.nodes.size() != change.clouds.size()) return "as many clouds as keyframes are missing";
   if (!state.nodes.empty() && news.session != state.session) return "the session changes";
   std::int32_t previous = state.nodes.empty() ? -1 : state.nodes.back().end.id;
   for (const GraphNode& node : news.nodes) {
@@ -170,8 +147,8 @@ std::string reference_problem(const SmootherState& state, std::size_t known, con
     if (index >= known) has_estimate[index - known] = true;
   }
   if (std::ranges::find(has_estimate, false) != has_estimate.end()) return "a new keyframe has no estimate";
-  if (!change.loops) return {};
-  for (const std::vector<GraphLoop>* list : {&change.loops->loops, &change.loops->waiting}) {
+  for (const std::vector<GraphLoop>* list :
+       {&change.loops.altered, &change.loops.appended, &change.waiting.altered, &change.waiting.appended}) {
     for (const GraphLoop& loop : *list) {
       const bool are_known = index_of(state.nodes, loop.result.from_id) < state.nodes.size() &&
                              index_of(state.nodes, loop.result.to_id) < state.nodes.size();
@@ -194,53 +171,54 @@ std::optional<GraphChange> decode_change(std::span<const std::byte> bytes) {
 }
 
 std::string RestoredGraph::apply(GraphChange change) {
-  if (std::string problem = chain_problem(state, change.state); !problem.empty()) return problem;
+  if (std::string problem = chain_problem(state, change); !problem.empty()) return problem;
+  if (!fits(change.loops, state.loops) || !fits(change.waiting, state.waiting)) return "a loop that changes is missing";
   const std::size_t known = state.nodes.size();
   std::ranges::move(change.state.nodes, std::back_inserter(state.nodes));
   if (std::string problem = reference_problem(state, known, change); !problem.empty()) {
     state.nodes.resize(known);
     return problem;
   }
-  std::ranges::move(change.state.clouds, std::back_inserter(state.clouds));
+  for (std::size_t i = known; i < state.nodes.size(); ++i) {
+    state.clouds.add(state.nodes[i].end.id, std::move(change.clouds[i - known]));
+  }
+  state.clouds.note_record(changes++);
   linearised.resize(state.nodes.size());
   for (LinearisationPoint& point : change.linearised) linearised[index_of(state.nodes, point.id)] = std::move(point);
-  change.state.nodes = std::move(state.nodes);
-  change.state.clouds = std::move(state.clouds);
-  LoopLists lists = change.loops ? std::move(*change.loops) : loops_of(state);
-  change.state.loops = std::move(lists.loops);
-  change.state.waiting = std::move(lists.waiting);
-  change.state.vetoes = std::move(lists.vetoes);
-  state = std::move(change.state);
+  apply_to(state.loops, std::move(change.loops));
+  apply_to(state.waiting, std::move(change.waiting));
+  std::ranges::move(change.state.vetoes, std::back_inserter(state.vetoes));
+  copy_scalars(change.state, state);
   return {};
 }
 
 ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph()) {}
 
 ChangeTracker::ChangeTracker(const RestoredGraph& known)
-    : linearised_(known.linearised), loops_(encoded(loops_of(known.state))) {}
+    : linearised_(known.linearised), vetoes_(known.state.vetoes.size()) {
+  static_cast<void>(loops_.next(known.state.loops));
+  static_cast<void>(waiting_.next(known.state.waiting));
+}
 
 GraphChange ChangeTracker::next(const SmootherState& state, std::vector<LinearisationPoint> linearised) {
   GraphChange change;
   const auto known = static_cast<std::ptrdiff_t>(linearised_.size());
   change.state.nodes.assign(state.nodes.begin() + known, state.nodes.end());
-  change.state.clouds.assign(state.clouds.begin() + known, state.clouds.end());
-  change.state.stats = state.stats;
-  change.state.angular_rate = state.angular_rate;
-  change.state.session = state.session;
-  change.state.expected_id = state.expected_id;
-  change.state.last_loop_id = state.last_loop_id;
-  change.state.next_loop_number = state.next_loop_number;
-  change.state.revision = state.revision;
+  for (std::size_t i = linearised_.size(); i < state.nodes.size(); ++i) {
+    const CompactCloud* cloud = state.clouds.in_memory(i);
+    change.clouds.push_back(cloud != nullptr ? *cloud : CompactCloud());
+  }
+  change.state.vetoes.assign(state.vetoes.begin() + static_cast<std::ptrdiff_t>(vetoes_), state.vetoes.end());
+  vetoes_ = state.vetoes.size();
+  copy_scalars(state, change.state);
   for (std::size_t i = 0; i < linearised.size(); ++i) {
     if (i >= linearised_.size() || !is_same_place(linearised_[i].state, linearised[i].state)) {
       change.linearised.push_back(linearised[i]);
     }
   }
   linearised_ = std::move(linearised);
-  LoopLists lists = loops_of(state);
-  std::vector<std::byte> loops = encoded(lists);
-  if (loops != loops_) change.loops = std::move(lists);
-  loops_ = std::move(loops);
+  change.loops = loops_.next(state.loops);
+  change.waiting = waiting_.next(state.waiting);
   return change;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "backend/loop_list_change.h"
 #include "backend/smoother_state.h"
 
 /// What one call changed in the graph, as the journal keeps it. All changes from the first one on, applied in order,
@@ -20,16 +21,11 @@ struct LinearisationPoint {
   NavState state;
 };
 
-/// All that is known of loops. Factor ids are not kept: the solver gives new ones.
-struct LoopLists {
-  std::vector<GraphLoop> loops;
-  std::vector<GraphLoop> waiting;
-  std::vector<LoopVeto> vetoes;
-};
-
 struct GraphChange {
-  SmootherState state;             ///< scalars as they are now; nodes and clouds: the new ones alone; no loops
-  std::optional<LoopLists> loops;  ///< the lists as they are now, if anything in them changed
+  SmootherState state;                         ///< scalars as they are now; nodes and vetoes: the new ones; no loops
+  std::vector<CompactCloud> clouds;            ///< one per new node
+  LoopListChange loops;                        ///< those in the graph
+  LoopListChange waiting;                      ///< those outside of it
   std::vector<LinearisationPoint> linearised;  ///< the new ones and those that moved
 };
 
@@ -42,6 +38,7 @@ struct GraphChange {
 struct RestoredGraph {
   SmootherState state;
   std::vector<LinearisationPoint> linearised;
+  std::size_t changes = 0;  ///< applied so far: the number of the next one's record
 
   /// The reason why `change` cannot follow, and then nothing is altered; empty when it was applied.
   [[nodiscard]] std::string apply(GraphChange change);
@@ -60,7 +57,9 @@ class ChangeTracker {
 
  private:
   std::vector<LinearisationPoint> linearised_;
-  std::vector<std::byte> loops_;  ///< encoded
+  LoopListMemory loops_;
+  LoopListMemory waiting_;
+  std::size_t vetoes_ = 0;
 };
 
 }  // namespace ignis

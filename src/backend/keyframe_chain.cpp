@@ -104,7 +104,7 @@ SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& con
   state.expected_id = keyframe.id + 1;
   state.angular_rate = keyframe.state.angular_rate;
   state.nodes.push_back(std::move(node));
-  state.clouds.push_back(one_per_voxel(keyframe.cloud, config.cloud_voxel_m));
+  state.clouds.add(keyframe.id, compact(one_per_voxel(keyframe.cloud, config.cloud_voxel_m)));
   return outcome;
 }
 

@@ -28,6 +28,7 @@ enum class LoopReason : std::int8_t {
   kNeedsSupport = 14,
   kKept = 15,
   kVetoed = 16,
+  kCloudLost = 17,
 };
 
 /// How far a loop has come. The numbers are those of loop_result_t.

@@ -12,16 +12,41 @@
 namespace ignis {
 namespace {
 
+/// A candidate's surroundings.
+struct LocalMap {
+  std::vector<std::vector<CloudPoint>> points;
+  std::vector<Pose> T_candidate_body;  ///< of each of them
+  std::string problem;                 ///< why there is none; empty when all is well
+
+  [[nodiscard]] std::vector<CloudInMap> clouds() const {
+    std::vector<CloudInMap> placed;
+    for (std::size_t i = 0; i < points.size(); ++i) placed.push_back({points[i], T_candidate_body[i]});
+    return placed;
+  }
+};
+
 /// Clouds of the candidate and its neighbours in the candidate's frame. Never reaches the keyframe that looks.
-std::vector<CloudInMap> local_map(std::size_t candidate, std::size_t neighbours, const SmootherState& state) {
+LocalMap local_map(std::size_t candidate, std::size_t neighbours, SmootherState& state) {
   const std::size_t first = candidate > neighbours ? candidate - neighbours : 0;
   const std::size_t last = std::min(candidate + neighbours, state.poses.size() - 2);
   const Pose T_candidate_map = state.poses[candidate].T_map_body.inverse();
-  std::vector<CloudInMap> clouds;
+  LocalMap map;
   for (std::size_t i = first; i <= last; ++i) {
-    clouds.push_back({state.clouds[i], T_candidate_map * state.poses[i].T_map_body});
+    CloudLookup cloud = state.clouds.find(i);
+    if (!cloud.problem.empty()) return {{}, {}, std::move(cloud.problem)};
+    map.points.push_back(std::move(cloud.points));
+    map.T_candidate_body.push_back(T_candidate_map * state.poses[i].T_map_body);
   }
-  return clouds;
+  return map;
+}
+
+LoopMatch match_in(const LocalMap& map, LoopSource& source, const Pose& T_candidate_current,
+                   const BackendConfig& config, const LoopGates& gates) {
+  if (map.problem.empty()) return match_loop(source, map.clouds(), T_candidate_current, config.matcher, gates);
+  LoopMatch lost;
+  lost.reason = LoopReason::kCloudLost;
+  lost.reason_text = map.problem;
+  return lost;
 }
 
 bool is_better(const LoopMatch& match, const LoopMatch& best) {
@@ -73,17 +98,17 @@ LoopProposal refusal(LoopReason reason) {
   return proposal;
 }
 
-LoopProposal best_match(const std::vector<std::size_t>& chosen, const SmootherState& state, const BackendConfig& config,
+LoopProposal best_match(const std::vector<std::size_t>& chosen, SmootherState& state, const BackendConfig& config,
                         const LoopGates& gates) {
   LoopProposal proposal;
   const KeyframePose& current = state.poses.back();
   const auto neighbours = static_cast<std::size_t>(config.matcher.neighbours);
-  LoopSource source(state.clouds.back(), config.matcher);
+  const CloudLookup looking = state.clouds.find(state.poses.size() - 1);
+  LoopSource source(looking.points, config.matcher);
   LoopMatch best;
   for (const std::size_t i : chosen) {
     const Pose T_candidate_current = state.poses[i].T_map_body.inverse() * current.T_map_body;
-    const LoopMatch match =
-        match_loop(source, local_map(i, neighbours, state), T_candidate_current, config.matcher, gates);
+    const LoopMatch match = match_in(local_map(i, neighbours, state), source, T_candidate_current, config, gates);
     if (match.verified()) ++proposal.result.passed;
     if (i != chosen.front() && !is_better(match, best)) continue;
     best = match;
@@ -103,7 +128,7 @@ bool is_vetoed(std::span<const LoopVeto> vetoes, std::int32_t from_id, std::int3
   });
 }
 
-LoopProposal search_loop(const SmootherState& state, const BackendConfig& config, const LoopGates& gates) {
+LoopProposal search_loop(SmootherState& state, const BackendConfig& config, const LoopGates& gates) {
   if (!config.use_loop_closing) return refusal(LoopReason::kDisabled);
   if (too_soon(state, config)) return refusal(LoopReason::kTooSoon);
   std::vector<std::size_t> candidates = loop_candidates({state.poses, state.places, state.odometry}, gates,

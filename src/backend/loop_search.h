@@ -23,6 +23,7 @@ struct LoopProposal {
 
 /// Looks for a loop that ends at the newest keyframe, unless one was closed only just. Up to loop_max_candidates are
 /// matched; the verified one with the largest matched fraction wins, the older one on a tie. Requires follow_nodes().
-[[nodiscard]] LoopProposal search_loop(const SmootherState& state, const BackendConfig& config, const LoopGates& gates);
+/// A candidate whose surroundings are lost (CloudStore) is refused.
+[[nodiscard]] LoopProposal search_loop(SmootherState& state, const BackendConfig& config, const LoopGates& gates);
 
 }  // namespace ignis

@@ -3,9 +3,11 @@
 
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/linear/GaussianConditional.h>
+#include <gtsam/linear/HessianFactor.h>
 #include <gtsam/linear/linearExceptions.h>
 
 #include <algorithm>
+#include <boost/make_shared.hpp>
 #include <boost/variant/get.hpp>
 #include <unordered_set>
 #include <utility>
@@ -13,6 +15,15 @@
 
 namespace ignis {
 namespace {
+
+/// GTSAM keeps the whole matrix of a clique whose leading rows it has eliminated, though it asks for the rest alone.
+void shed_eliminated_rows(gtsam::ISAM2Clique& clique) {
+  const auto hessian = boost::dynamic_pointer_cast<gtsam::HessianFactor>(clique.cachedFactor());
+  if (!hessian || hessian->info().blockStart() == 0) return;
+  auto rest = gtsam::SymmetricBlockMatrix::LikeActiveViewOf(hessian->info());
+  rest.setFullMatrix(hessian->augmentedInformation());
+  clique.cachedFactor() = boost::make_shared<gtsam::HessianFactor>(hessian->keys(), rest);
+}
 
 gtsam::ISAM2Params without_relinearisation(gtsam::ISAM2Params params) {
   params.enableRelinearization = false;
@@ -117,6 +128,7 @@ gtsam::KeyVector ObservedIsam2::back_substitute() {
                                                [&](gtsam::Key key) { return changed.contains(key); });
     if (!depends) continue;
     open.insert(open.end(), clique->children.begin(), clique->children.end());
+    if (is_new) shed_eliminated_rows(*clique);
     if (!solve(conditional, is_new ? 0.0 : threshold)) continue;
     changed.insert(conditional.beginFrontals(), conditional.endFrontals());
     moved.insert(moved.end(), conditional.beginFrontals(), conditional.endFrontals());

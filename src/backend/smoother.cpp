@@ -17,9 +17,19 @@
 
 namespace ignis {
 
+namespace {
+
+CloudStore empty_store(const BackendConfig& config, const RecordArchive* archive) {
+  return {static_cast<std::size_t>(1e6 * config.cloud_memory_mb), archive};
+}
+
+}  // namespace
+
 struct Smoother::Impl {
-  Impl(const BackendConfig& backend, const LoopGates& loop_gates)
-      : config(backend), gates(loop_gates), solver(backend.solver) {}
+  Impl(const BackendConfig& backend, const LoopGates& loop_gates, const RecordArchive* archive)
+      : config(backend), gates(loop_gates), solver(backend.solver) {
+    state.clouds = empty_store(backend, archive);
+  }
 
   void close_loop(SmootherUpdate& update) {
     LoopProposal proposal = search_loop(state, config, gates);
@@ -51,12 +61,13 @@ struct Smoother::Impl {
   IncrementalSolver solver;
   SmootherState state;
   ChangeTracker tracker;
+  std::size_t changes = 0;  ///< taken so far
 };
 
-Smoother::Smoother(const BackendConfig& config, const LoopGates& gates) {
+Smoother::Smoother(const BackendConfig& config, const LoopGates& gates, const RecordArchive* archive) {
   config::require_valid(config, "backend");
   config::require_valid(gates, "frontend");
-  impl_ = std::make_unique<Impl>(config, gates);
+  impl_ = std::make_unique<Impl>(config, gates, archive);
 }
 
 Smoother::~Smoother() = default;
@@ -64,7 +75,7 @@ Smoother::Smoother(Smoother&&) noexcept = default;
 Smoother& Smoother::operator=(Smoother&&) noexcept = default;
 
 SmootherUpdate Smoother::add_keyframe(const Keyframe& keyframe) {
-  auto& [config, gates, solver, state, tracker] = *impl_;
+  auto& [config, gates, solver, state, tracker, changes] = *impl_;
   SmootherUpdate update;
   update.verdict = verdict_on(keyframe, state, update.reason);
   if (update.accepted()) {
@@ -87,7 +98,7 @@ SmootherUpdate Smoother::add_keyframe(const Keyframe& keyframe) {
 }
 
 SmootherUpdate Smoother::add_loop(const LoopMeasurement& measurement) {
-  auto& [config, gates, solver, state, tracker] = *impl_;
+  auto& [config, gates, solver, state, tracker, changes] = *impl_;
   SmootherUpdate update;
   LoopResult result;
   result.from_id = measurement.from_id;
@@ -122,7 +133,7 @@ bool Smoother::is_of_another_drive(const Keyframe& keyframe) const {
 }
 
 SmootherUpdate Smoother::withdraw_loop(std::int32_t from_id, std::int32_t to_id) {
-  auto& [config, gates, solver, state, tracker] = *impl_;
+  auto& [config, gates, solver, state, tracker, changes] = *impl_;
   SmootherUpdate update;
   update.verdict = KeyframeVerdict::kAccepted;
   for (GraphLoop& event : dismiss_loops(from_id, to_id, solver, state))
@@ -140,7 +151,7 @@ SmootherUpdate Smoother::veto_loop(std::int32_t from_id, std::int32_t to_id) {
 ShadowProblem Smoother::shadow_problem() { return ignis::shadow_problem(impl_->solver, impl_->state); }
 
 SmootherUpdate Smoother::adopt(const ShadowOptimum& optimum) {
-  auto& [config, gates, solver, state, tracker] = *impl_;
+  auto& [config, gates, solver, state, tracker, changes] = *impl_;
   SmootherUpdate update;
   update.verdict = KeyframeVerdict::kAccepted;
   if (take_over(optimum, config, solver, state)) ++state.revision;
@@ -164,17 +175,24 @@ SmootherStats Smoother::stats() const {
                                                              [](const GraphLoop& loop) { return loop.result.stage; }));
   stats.loops_waiting = static_cast<int>(impl_->state.waiting.size());
   stats.solver_rebuilds = impl_->solver.rebuilds();
+  stats.clouds_forgotten = impl_->state.clouds.forgotten();
+  stats.clouds_unreadable = impl_->state.clouds.unreadable();
   return stats;
 }
 
 std::vector<std::byte> Smoother::take_change() {
-  return encode_change(impl_->tracker.next(impl_->state, linearisation_of(impl_->solver, impl_->state)));
+  auto& impl = *impl_;
+  const GraphChange change = impl.tracker.next(impl.state, linearisation_of(impl.solver, impl.state));
+  impl.state.clouds.note_record(impl.changes++);
+  return encode_change(change);
 }
 
 SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGates& gates,
-                                     std::span<const std::span<const std::byte>> records) {
-  SmootherRestoration restoration{Smoother(config, gates), 0, {}};
+                                     std::span<const std::span<const std::byte>> records,
+                                     const RecordArchive* archive) {
+  SmootherRestoration restoration{Smoother(config, gates, archive), 0, {}};
   RestoredGraph graph;
+  graph.state.clouds = empty_store(config, archive);
   for (const std::span<const std::byte> record : records) {
     std::optional<GraphChange> change = decode_change(record);
     restoration.problem = change ? graph.apply(std::move(*change)) : "a record is no change of a graph";
@@ -183,9 +201,10 @@ SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGate
   }
   Smoother::Impl& impl = *restoration.smoother.impl_;
   if (std::string refusal = restore_solver(graph, config, impl.solver); !refusal.empty()) {
-    return {Smoother(config, gates), 0, std::move(refusal)};
+    return {Smoother(config, gates, archive), 0, std::move(refusal)};
   }
   impl.tracker = ChangeTracker(graph);
+  impl.changes = graph.changes;
   impl.state = std::move(graph.state);
   return restoration;
 }

@@ -12,6 +12,7 @@
 #include "backend/keyframe_pose.h"
 #include "backend/loop_result.h"
 #include "backend/pose_graph_file.h"
+#include "backend/record_archive.h"
 #include "backend/shadow_optimum.h"
 #include "common/keyframe.h"
 #include "common/loop_gates.h"
@@ -56,7 +57,9 @@ struct SmootherStats {
   int duplicates = 0;
   int gaps = 0;
   int invalid = 0;
-  int without_imu = 0;  ///< keyframes linked without preintegration
+  int without_imu = 0;        ///< keyframes linked without preintegration
+  int clouds_forgotten = 0;   ///< dropped for want of memory and an archive: no loop ends there any more
+  int clouds_unreadable = 0;  ///< times that a cloud could not be read back, so that a candidate was refused
   int solver_rebuilds = 0;
   int shadow_checks = 0;        ///< batch solutions that were compared with the incremental one
   int shadow_swaps = 0;         ///< of these, so far away that they took its place
@@ -83,8 +86,9 @@ struct SmootherRestoration;
 /// Deterministic, no clock; one thread.
 class Smoother {
  public:
-  /// Throws config::ConfigError naming every offence.
-  Smoother(const BackendConfig& config, const LoopGates& gates);
+  /// `archive` keeps what take_change() gives; clouds beyond `cloud_memory_mb` are read back from it, and forgotten
+  /// without one. It outlives the smoother. Throws config::ConfigError naming every offence.
+  Smoother(const BackendConfig& config, const LoopGates& gates, const RecordArchive* archive = nullptr);
   ~Smoother();
   Smoother(Smoother&&) noexcept;
   Smoother& operator=(Smoother&&) noexcept;
@@ -126,12 +130,13 @@ class Smoother {
   /// Poses, odometry and loops for keyframes.g2o.
   [[nodiscard]] PoseGraph pose_graph() const;
 
-  /// What changed since the previous call, as a record for the journal.
+  /// What changed since the previous call, as the next record for the archive.
   [[nodiscard]] std::vector<std::byte> take_change();
 
  private:
   friend SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGates& gates,
-                                              std::span<const std::span<const std::byte>> records);
+                                              std::span<const std::span<const std::byte>> records,
+                                              const RecordArchive* archive);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;
@@ -145,8 +150,10 @@ struct SmootherRestoration {
 };
 
 /// The smoother that take_change() wrote these records of, in order, under the same configuration: same keyframes,
-/// loops, revision and estimates. Throws config::ConfigError naming every offence.
+/// loops, revision and estimates. `archive` holds them by their places in `records`. Throws config::ConfigError naming
+/// every offence.
 [[nodiscard]] SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGates& gates,
-                                                   std::span<const std::span<const std::byte>> records);
+                                                   std::span<const std::span<const std::byte>> records,
+                                                   const RecordArchive* archive = nullptr);
 
 }  // namespace ignis

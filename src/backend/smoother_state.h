@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "backend/cloud_store.h"
 #include "backend/information.h"
 #include "backend/keyframe_factors.h"
 #include "backend/keyframe_pose.h"
@@ -40,11 +41,11 @@ struct LoopVeto {
 /// in keyframe_chain.h, loop_*.h and revision_report.h. The vectors of one element per node share their indices.
 struct SmootherState {
   std::vector<GraphNode> nodes;
-  std::vector<std::vector<CloudPoint>> clouds;  ///< body frame, one per node
-  std::vector<KeyframePose> poses;              ///< as the graph places them, one per node
-  std::vector<Pose> published;                  ///< as last listed in an update
-  std::vector<GraphLoop> loops;                 ///< in the graph
-  std::vector<GraphLoop> waiting;               ///< verified, but outside of it
+  CloudStore clouds;                ///< body frame, one per node
+  std::vector<KeyframePose> poses;  ///< as the graph places them, one per node
+  std::vector<Pose> published;      ///< as last listed in an update
+  std::vector<GraphLoop> loops;     ///< in the graph
+  std::vector<GraphLoop> waiting;   ///< verified, but outside of it
   std::vector<LoopVeto> vetoes;
   SmootherStats stats;
   Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "common/compact_cloud.h"
 #include "messages/field_copy.h"
 
 namespace ignis::messages {
@@ -13,17 +13,9 @@ namespace {
 // 28 bytes a sample and 7 bytes a point: both slices together stay below 56 kB beside the 2.3 kB of plain fields.
 constexpr std::int64_t kMaxImuPerPart = 800;
 constexpr std::int64_t kMaxCloudPerPart = 4500;
-constexpr double kFinestResolution = 0.001;  // [m]
 
 std::int64_t parts_for(std::size_t items, std::int64_t per_part) {
   return (static_cast<std::int64_t>(items) + per_part - 1) / per_part;
-}
-
-float resolution_for(const std::vector<CloudPoint>& cloud) {
-  float reach = 0.0F;
-  for (const CloudPoint& point : cloud) reach = std::max(reach, point.position.cwiseAbs().maxCoeff());
-  const double needed = static_cast<double>(reach) / std::numeric_limits<std::int16_t>::max();
-  return static_cast<float>(kFinestResolution * std::max(1.0, std::ceil(needed / kFinestResolution)));
 }
 
 keyframe_t plain_fields(const Keyframe& keyframe) {

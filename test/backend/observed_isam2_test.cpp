@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <gtsam/geometry/Pose3.h>
 #include <gtsam/inference/Symbol.h>
+#include <gtsam/linear/HessianFactor.h>
 #include <gtsam/slam/BetweenFactor.h>
 
 #include <algorithm>
@@ -108,6 +109,25 @@ TEST_P(ObservedIsam2History, StandsWhereGtsamsOwnStandsAndNamesWhatMoved) {
 }
 
 INSTANTIATE_TEST_SUITE_P(RelinearizeSkips, ObservedIsam2History, ::testing::Values(1, 3));
+
+TEST(ObservedIsam2, KeepsOfItsCachedMatricesOnlyWhatIsAskedForAgain) {
+  Twins twins(1, 1);
+  for (int i = 0; i < 40; ++i) twins.append(i);
+  twins.close(39, 3);
+  std::vector<gtsam::ISAM2Clique::shared_ptr> open(twins.ours.roots().begin(), twins.ours.roots().end());
+  int hessians = 0;
+  while (!open.empty()) {
+    const auto clique = open.back();
+    open.pop_back();
+    open.insert(open.end(), clique->children.begin(), clique->children.end());
+    const auto hessian = boost::dynamic_pointer_cast<gtsam::HessianFactor>(clique->cachedFactor());
+    if (!hessian) continue;
+    ++hessians;
+    EXPECT_EQ(hessian->info().blockStart(), 0) << "rows of eliminated variables are left";
+    EXPECT_EQ(hessian->keys().size(), clique->conditional()->nrParents());
+  }
+  EXPECT_GT(hessians, 10);
+}
 
 /// A straight chain.
 class Chain {

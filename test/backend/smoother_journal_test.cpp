@@ -185,6 +185,30 @@ TEST(SmootherJournalRecords, HoldWhatChangedAndNothingElse) {
   EXPECT_LT(smoother.take_change().size(), 200U) << "when nothing has happened";
 }
 
+TEST(SmootherJournalRecords, DoNotGrowWithTheLoopsInTheGraph) {
+  const testing::Drive drive = testing::make_drive({.seed = 6, .keyframes = 120});
+  BackendConfig config;
+  config.use_loop_closing = false;
+  Smoother smoother(config, LoopGates());
+  std::mt19937 random(6);
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(smoother.add_keyframe(keyframe));
+    if (keyframe.id >= 12) static_cast<void>(smoother.add_loop(random_loop(drive, keyframe.id, true, random)));
+  }
+  ASSERT_GE(smoother.stats().loops_kept, 80);
+  static_cast<void>(smoother.take_change());
+  const std::size_t before = smoother.take_change().size();
+  const PoseGraph graph = smoother.pose_graph();
+  const PoseGraphEdge& loop = graph.edges.back();
+  ASSERT_TRUE(loop.is_loop);
+  static_cast<void>(smoother.withdraw_loop(loop.to, loop.from));
+  std::optional<GraphChange> change = decode_change(smoother.take_change());
+  ASSERT_TRUE(change);
+  EXPECT_EQ(change->loops.removed.size(), 1U);
+  EXPECT_TRUE(change->loops.altered.empty() && change->loops.appended.empty());
+  EXPECT_LT(before, 200U);
+}
+
 TEST(SmootherJournalRecords, SixHundredKeyframesAreBackWithinTwoSeconds) {
   const testing::Drive drive = testing::make_drive({.seed = 5, .keyframes = 600});
   BackendConfig config;

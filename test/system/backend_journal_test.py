@@ -4,8 +4,10 @@
 import contextlib
 import json
 import os
+import struct
 import subprocess
 import time
+import zlib
 from pathlib import Path
 
 import pytest
@@ -46,6 +48,16 @@ def test_journal_of_another_configuration_is_kept_but_not_used(keyframes: list[l
     said = first_words(tmp_path, tmp_path / "other.json")
     assert "another configuration" in said and f"{JOURNAL}.old1" in said
     assert (tmp_path / "journal" / f"{JOURNAL}.old1").stat().st_size > 100_000
+
+
+def test_journal_of_another_version_is_named_and_kept(private_network, tmp_path: Path) -> None:
+    payload = b"IGNISJNL" + struct.pack("<II", 2, 3) + b"abc" + struct.pack("<i", 0)
+    (tmp_path / "journal").mkdir()
+    file = tmp_path / "journal" / JOURNAL
+    file.write_bytes(struct.pack("<II", len(payload), zlib.crc32(payload)) + payload)
+    said = first_words(tmp_path, CONFIG)
+    assert "it has version 2, this build writes 3" in said and f"{JOURNAL}.old1" in said
+    assert (tmp_path / "journal" / f"{JOURNAL}.old1").exists() and not file.exists()
 
 
 def test_torn_tail_is_cut_off_and_told(keyframes: list[list[bytes]], tmp_path: Path) -> None:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The real back end over real LCM: killed in the middle of a drive, and with datagrams lost."""
 
+import json
 import os
 import random
+import threading
 from pathlib import Path
 
 import pytest
@@ -44,6 +46,41 @@ def test_killed_back_end_ends_with_the_same_graph(
     assert outcome.resumes, "no process said that it resumed"
     assert outcome.distance(undisturbed) < SAME_TRAJECTORY
     assert outcome.revision == undisturbed.revision
+
+
+@pytest.fixture
+def few_clouds(tmp_path: Path) -> Path:
+    """A configuration by which memory holds one or two clouds."""
+    config = json.loads(CONFIG.read_text())
+    config.pop("$schema", None)
+    config["backend"]["cloud_memory_mb"] = 0.1
+    path = tmp_path / "few_clouds.json"
+    path.write_text(json.dumps(config))
+    return path
+
+
+def test_back_end_with_few_clouds_in_memory_ends_with_the_same_graph_though_it_is_killed(
+    keyframes: list[list[bytes]], undisturbed: Outcome, few_clouds: Path, tmp_path: Path
+) -> None:
+    outcome = BackendRun(tmp_path, few_clouds, keyframes, 0.0, 1).drive(INTERVAL, [3.0])
+    assert outcome.loops == undisturbed.loops and outcome.loops
+    assert outcome.distance(undisturbed) < SAME_TRAJECTORY
+    assert outcome.revision == undisturbed.revision
+
+
+def test_journal_that_gives_no_cloud_back_costs_loops_and_is_told(
+    keyframes: list[list[bytes]], few_clouds: Path, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal" / "graph_backend.journal"
+
+    def damage() -> None:
+        with journal.open("r+b") as file:
+            file.write(bytes(journal.stat().st_size))
+
+    threading.Timer(0.5 * len(keyframes) * INTERVAL, damage).start()
+    outcome = BackendRun(tmp_path, few_clouds, keyframes, 0.0, 1).drive(INTERVAL)
+    assert len(outcome.poses) == len(keyframes)
+    assert any("the journal did not give a cloud back" in text for text in outcome.health)
 
 
 @pytest.mark.parametrize("loss", [0.1])
