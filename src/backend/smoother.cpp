@@ -164,6 +164,7 @@ SmootherStats Smoother::stats() const {
                                                              [](const GraphLoop& loop) { return loop.result.stage; }));
   stats.loops_waiting = static_cast<int>(impl_->state.waiting.size());
   stats.solver_rebuilds = impl_->solver.rebuilds();
+  stats.solver_failure = impl_->solver.failure();
   return stats;
 }
 
