@@ -62,13 +62,14 @@ def own_errors(view: ViewPage) -> list[str]:
 
 def wait_until_whole(view: ViewPage) -> None:
     """The page is connected, goes on, and holds what the server announced."""
-    before = view.hook("applied")[-1]["utime"]
+    # Frames are counted by the page itself: what a damaged announcement said of them may be anything.
+    before = sum(view.hook("snapshots", "deltas"))
 
     def is_whole() -> bool:
         newest = view.hook("applied")[-1]
         return (
             view.hook("connected")
-            and newest["utime"] > before
+            and sum(view.hook("snapshots", "deltas")) > before
             and newest["checksum"] == newest["announcedChecksum"]
             and newest["counts"] == newest["announcedCounts"]
         )

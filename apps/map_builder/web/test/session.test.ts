@@ -76,6 +76,17 @@ describe("StreamSession", () => {
     expect(sent.length).toBe(2);
   });
 
+  it.each([["utime", undefined], ["sequence", "2"], ["revision", null], ["counts", [1, 0]], ["counts", "1,0"], ["checksum", 7], ["kind", "delts"]])(
+    "takes no frame whose announcement has a bad %s (%s), counts it and asks for a snapshot",
+    (field, value) => {
+      offer("snapshot", 1, [voxel(1)]);
+      const whole = { type: "frame", kind: "delta", sequence: 2, base: 1, revision: 2, counts: [2, 0, 0], checksum: "0", utime: 0 };
+      session.takeText(JSON.stringify({ ...whole, [field as string]: value }));
+      session.takeBinary(encode({ voxels: [voxel(2)] }), tick);
+      expect([applied.length, session.errors > 0, sent]).toEqual([1, true, [{ resync: true }]]);
+    },
+  );
+
   it("begins anew after a reconnection", () => {
     offer("snapshot", 1, [voxel(1)]);
     session.begin();

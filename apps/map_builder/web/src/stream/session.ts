@@ -3,7 +3,7 @@
 // what the server announced, and asks for a snapshot when something does not fit. Knows no socket and no clock.
 
 import { decodeFrame, decodeLoopClouds, type Frame } from "./frame";
-import type { ClientText, FrameAnnouncement, LoopClouds, PerLevel, ServerText } from "./protocol";
+import { LEVELS, type ClientText, type FrameAnnouncement, type LoopClouds, type PerLevel, type ServerText } from "./protocol";
 import { VoxelStore } from "./voxel_store";
 
 /** After so many snapshots in a row that do not fit the next one is asked for later [tenths of a second]. */
@@ -57,8 +57,21 @@ export class StreamSession {
       this.errors++;
       return;
     }
-    if (message.type === "frame" || message.type === "loop_clouds") this.announced = message;
+    if (message.type === "frame") this.announceFrame(message);
+    else if (message.type === "loop_clouds") this.announced = message;
     else this.events.text(message);
+  }
+
+  /** An announcement that lacks something announces nothing: the binary message behind it is then asked for again. */
+  private announceFrame(message: FrameAnnouncement): void {
+    const { kind, sequence, revision, utime, counts, checksum } = message;
+    const isWhole =
+      (kind === "snapshot" || kind === "delta") &&
+      [sequence, revision, utime].every(Number.isSafeInteger) &&
+      Array.isArray(counts) && counts.length === LEVELS && counts.every(Number.isSafeInteger) &&
+      typeof checksum === "string";
+    this.announced = isWhole ? message : null;
+    if (!isWhole) this.errors++;
   }
 
   takeBinary(buffer: ArrayBuffer, tick: number): void {
