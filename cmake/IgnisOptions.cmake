@@ -49,7 +49,18 @@ function(ignis_optimise_loops name)
   target_compile_options(${name} PRIVATE $<$<CONFIG:RelWithDebInfo>:-O3 -fno-semantic-interposition>)
 endfunction()
 
-# ignis_add_test(NAME SOURCES... LINK targets...): a GoogleTest program; each test becomes a ctest entry.
+# Sanitized code takes several times as long.
+set(IGNIS_TEST_LIMIT 300)
+if(IGNIS_SANITIZERS)
+  set(IGNIS_TEST_LIMIT 1800)
+endif()
+
+# Every test program, without the applications and benchmarks; test/sanitize reads the list.
+add_custom_target(tests)
+file(WRITE ${CMAKE_BINARY_DIR}/test_programs.txt "")
+
+# ignis_add_test(NAME SOURCES... LINK targets...): a GoogleTest program; each test becomes a ctest entry with the
+# program's name as label.
 function(ignis_add_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -57,5 +68,7 @@ function(ignis_add_test name)
   target_compile_definitions(${name} PRIVATE IGNIS_TEST_DATA="${CMAKE_SOURCE_DIR}/test/data"
                              IGNIS_CONFIG_DIR="${CMAKE_SOURCE_DIR}/config")
   target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main ignis_warnings)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${IGNIS_TEST_LIMIT} LABELS ${name})
+  add_dependencies(tests ${name})
+  file(APPEND ${CMAKE_BINARY_DIR}/test_programs.txt "${name}\n")
 endfunction()

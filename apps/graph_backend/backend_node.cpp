@@ -207,7 +207,12 @@ void BackendNode::request_missing_keyframes() {
 void BackendNode::publish_health() {
   keyframe_counts_->queue_drops = assembler_.incomplete();
   const SmootherStats stats = graph_.smoother().stats();
-  if (!refusal_.empty()) {
+  if (!stats.solver_failure.empty()) {
+    link_.report_health(
+        newest_utime_, health_t::FAULT,
+        std::format("the graph takes no more keyframes: {}; a restart or a new session begins a new graph",
+                    stats.solver_failure));
+  } else if (!refusal_.empty()) {
     link_.report_health(newest_utime_, health_t::DEGRADED, refusal_);
   } else if (const std::string failure = graph_.failure(); !failure.empty()) {
     link_.report_health(newest_utime_, health_t::DEGRADED, failure);

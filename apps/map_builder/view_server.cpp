@@ -19,6 +19,7 @@
 #include "map/stream_encoding.h"
 #include "map_builder/listening_socket.h"
 #include "map_builder/request_rules.h"
+#include "map_builder/stream_options.h"
 #include "map_builder/web_files.h"
 
 namespace ignis {
@@ -252,14 +253,10 @@ net::awaitable<void> ViewServer::serve_viewer(beast::tcp_stream stream, Request 
   stream.expires_never();  // the WebSocket has its own timers
   beast::error_code ignored;
   stream.socket().set_option(net::socket_base::send_buffer_size(kSendBuffer), ignored);
-  stream.socket().set_option(net::ip::tcp::no_delay(true), ignored);
   ViewClient::Stream upgraded(std::move(stream));
-  // Only the handshakes are timed here: an idle timer that counts what arrives would end slow readers (check_life).
-  upgraded.set_option(websocket::stream_base::timeout{kRequestTimeout, websocket::stream_base::none(), false});
+  set_stream_options(upgraded, kMaxInboundBytes);
   upgraded.set_option(websocket::stream_base::decorator(
       [](websocket::response_type& response) { response.set(http::field::sec_websocket_protocol, kStreamProtocol); }));
-  upgraded.read_message_max(kMaxInboundBytes);
-  upgraded.auto_fragment(false);  // control frames can wait for one map frame; 4 kB pieces would cost a call each
   const auto client = std::make_shared<ViewClient>(++next_client_, std::move(upgraded), viewers_);
   // The place is taken before the handshake ends, so that nobody slips past the limit meanwhile.
   clients_[client->id()] = client;

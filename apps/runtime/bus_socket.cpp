@@ -8,6 +8,7 @@
 #include <system_error>
 #include <vector>
 
+#include <arpa/inet.h>
 #include <linux/filter.h>
 #include <linux/if_packet.h>
 #include <linux/sock_diag.h>
@@ -77,6 +78,14 @@ std::vector<int> bus_sockets(std::uint16_t port) {
   return found;
 }
 
+/// One spelling for each address; what is none stays as it is, for LCM to refuse.
+std::string written_once(const std::string& group) {
+  in_addr address{};
+  std::array<char, INET_ADDRSTRLEN> text{};
+  if (inet_aton(group.c_str(), &address) == 0) return group;
+  return inet_ntop(AF_INET, &address, text.data(), text.size());
+}
+
 }  // namespace
 
 std::optional<BusAddress> BusAddress::parse(const std::string& url) {
@@ -85,8 +94,8 @@ std::optional<BusAddress> BusAddress::parse(const std::string& url) {
   const std::string rest = url.substr(kScheme.size());
   const std::string host = rest.substr(0, rest.find('?'));
   const std::size_t colon = host.find(':');
-  constexpr std::uint16_t kLcmPort = 7667;
-  BusAddress address{.port = kLcmPort, .stays_home = true};
+  BusAddress address;
+  if (const std::string group = host.substr(0, colon); !group.empty()) address.group = written_once(group);
   if (colon != std::string::npos) {
     const std::optional<int> port = number_of(host.substr(colon + 1));
     if (!port || *port < 1 || *port > 65535) return std::nullopt;

@@ -7,9 +7,10 @@
 
 namespace ignis::runtime {
 
-/// What the bus's URL says about the datagrams that may come in.
+/// What the bus's URL says about the datagrams that may come in. What it leaves out is LCM's default.
 struct BusAddress {
-  std::uint16_t port = 0;
+  std::string group = "239.255.76.67";  ///< as inet_ntop() writes it
+  std::uint16_t port = 7667;
   bool stays_home = true;  ///< ttl=0: nobody sends to another computer, so nothing from one is ours
 
   /// Nothing for buses that are no UDP multicast, such as memq.

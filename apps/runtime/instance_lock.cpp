@@ -6,25 +6,23 @@
 #include <cstddef>
 #include <cstring>
 #include <format>
+#include <optional>
 
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include "runtime/application.h"
+#include "runtime/bus_socket.h"
 
 namespace ignis::runtime {
-namespace {
-
-constexpr char kMulticast[] = "udpm://";
-
-}  // namespace
 
 InstanceLock::InstanceLock(const std::string& process, const std::string& url) {
-  if (!url.starts_with(kMulticast)) return;
-  // Options behind the address do not make another bus.
-  const std::string bus = url.substr(0, url.find('?'));
-  const std::string name = std::format("ignis-lio/{}/{}", process, bus.substr(sizeof kMulticast - 1));
+  const std::optional<BusAddress> address_of_bus = BusAddress::parse(url);
+  if (!address_of_bus) return;
+  // The same bus has many spellings, and options behind the address do not make another one.
+  const std::string bus = std::format("{}:{}", address_of_bus->group, address_of_bus->port);
+  const std::string name = std::format("ignis-lio/{}/{}", process, bus);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   // The first byte stays zero: a name of the abstract namespace.
@@ -38,7 +36,7 @@ InstanceLock::InstanceLock(const std::string& process, const std::string& url) {
   ::close(socket_);
   const std::string why =
       error == EADDRINUSE
-          ? std::format("another {} is on the bus {}; ./ignis status shows its process id", process, bus)
+          ? std::format("another {} is on the bus udpm://{}; ./ignis status shows its process id", process, bus)
           : std::format("cannot make sure to be alone on the bus: {}", std::strerror(error));
   throw UserError(why, kFailed);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <format>
+#include <iterator>
 
 namespace ignis::runtime {
 namespace {
@@ -21,6 +22,7 @@ void PeerWatch::observe(const PeerIdentity& peer, double now_s) {
                 .pid = peer.pid,
                 .version = peer.version.substr(0, kMaxTextLength),
                 .config_hash = peer.config_hash.substr(0, kMaxTextLength)};
+  if (heard.messages == 0) heard.first_s = now_s;
   heard.last_s = now_s;
   ++heard.messages;
   note_start(key.first, peer.pid, now_s);
@@ -51,6 +53,18 @@ std::string PeerWatch::disagreement(const Heard& heard) const {
   return {};
 }
 
+/// Two others of one name that are both there. Tools, which name no configuration, may be there twice.
+std::string PeerWatch::twins(const Heard& a, const Heard& b, double now_s) const {
+  const bool is_no_concern =
+      a.peer.process == self_.process || a.peer.config_hash.empty() || b.peer.config_hash.empty();
+  if (a.peer.process != b.peer.process || is_no_concern) return {};
+  const double gone_first_s = std::min(a.last_s, b.last_s);
+  if (now_s - gone_first_s > kForgetAfter_s) return {};
+  if (gone_first_s - std::max(a.first_s, b.first_s) < kSideBySide_s) return {};
+  return std::format("two instances of {} are on the bus (processes {} and {})", a.peer.process, a.peer.pid,
+                     b.peer.pid);
+}
+
 std::string PeerWatch::trouble(double now_s) const {
   std::string text;
   const auto add = [&text](const std::string& one) {
@@ -59,6 +73,10 @@ std::string PeerWatch::trouble(double now_s) const {
   };
   for (const auto& [key, heard] : peers_) {
     if (now_s - heard.last_s <= kForgetAfter_s) add(disagreement(heard));
+  }
+  // In the order of names, instances of one executable are neighbours.
+  for (auto each = peers_.begin(); each != peers_.end(); ++each) {
+    if (const auto other = std::next(each); other != peers_.end()) add(twins(each->second, other->second, now_s));
   }
   for (const auto& [process, starts] : starts_) {
     if (starts.size() == kCrashLoopStarts && now_s - starts.front().heard_s <= kCrashLoopSeconds) {

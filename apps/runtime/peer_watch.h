@@ -29,6 +29,9 @@ class PeerWatch {
   /// HEALTH messages of a second instance before it is believed: a killed process's last one may still be on its way.
   static constexpr int kInstanceMessages = 3;
 
+  /// [s] that two instances of another executable must have lived side by side: one that is started anew has not.
+  static constexpr double kSideBySide_s = 1.5;
+
   /// A process of which so many instances were heard within this time ends again and again.
   static constexpr std::size_t kCrashLoopStarts = 5;
   static constexpr double kCrashLoopSeconds = 60.0;
@@ -50,6 +53,7 @@ class PeerWatch {
  private:
   struct Heard {
     PeerIdentity peer;
+    double first_s = 0.0;
     double last_s = 0.0;
     int messages = 0;
   };
@@ -58,6 +62,7 @@ class PeerWatch {
     double heard_s = 0.0;
   };
   [[nodiscard]] std::string disagreement(const Heard& heard) const;
+  [[nodiscard]] std::string twins(const Heard& a, const Heard& b, double now_s) const;
   void note_start(const std::string& process, std::int32_t pid, double now_s);
 
   PeerIdentity self_;

@@ -151,18 +151,23 @@ class Recording:
             self.paused = True
             self.interruptions.append(f"the disk has less than {keep:.0f} MB left")
             return f"{self.interruptions[-1]}: paused until there is room"
-        if self.logger.poll() is None:
+        if (code := self.logger.poll()) is None:
+            return None
+        if self.interruptions and time.monotonic() - self._started < _LEAST_LIFE_S:
+            # A successor that ended at once is followed too, but not in a rush.
+            self._tell(health_t.FAULT, f"recording stands still: lcm-logger ended at once with code {code}")
             return None
         return self._succeed_logger()
 
     def _succeed_logger(self) -> str:
-        """The logger has ended on its own; one that cannot work at all is not started again."""
+        """The logger has ended on its own. When it was the first one and ended at once, it cannot work at all."""
         code = self.logger.returncode
         said = (self.logger.stderr.read() if self.logger.stderr else "").strip().splitlines()
-        if time.monotonic() - self._started < _LEAST_LIFE_S:
+        if not self.interruptions and time.monotonic() - self._started < _LEAST_LIFE_S:
             raise InputError(f"lcm-logger ended with code {code}: {(said or ['no message'])[-1]}")
         self.interruptions.append(f"lcm-logger ended with code {code}")
         self._begin_next_file()
+        self._tell(health_t.OK, "recording goes on")
         return f"{self.interruptions[-1]}; recording goes on in {self.file(0)}"
 
     def _begin_next_file(self) -> None:

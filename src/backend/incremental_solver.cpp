@@ -313,6 +313,8 @@ bool IncrementalSolver::restart_at(const gtsam::Values& values) {
   return false;
 }
 
+const std::string& IncrementalSolver::failure() const { return impl_->broken; }
+
 int IncrementalSolver::rebuilds() const { return impl_->rebuilds; }
 
 }  // namespace ignis

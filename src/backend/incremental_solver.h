@@ -112,6 +112,9 @@ class IncrementalSolver {
   /// it goes on from where it was.
   [[nodiscard]] bool restart_at(const gtsam::Values& values);
 
+  /// Why nothing is accepted any more: not even a fresh iSAM2 solves the factors. Empty while all is well.
+  [[nodiscard]] const std::string& failure() const;
+
   /// Times that iSAM2 had to be built anew.
   [[nodiscard]] int rebuilds() const;
 

@@ -177,6 +177,7 @@ SmootherStats Smoother::stats() const {
   stats.solver_rebuilds = impl_->solver.rebuilds();
   stats.clouds_forgotten = impl_->state.clouds.forgotten();
   stats.clouds_unreadable = impl_->state.clouds.unreadable();
+  stats.solver_failure = impl_->solver.failure();
   return stats;
 }
 

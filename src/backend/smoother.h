@@ -61,6 +61,7 @@ struct SmootherStats {
   int clouds_forgotten = 0;   ///< dropped for want of memory and an archive: no loop ends there any more
   int clouds_unreadable = 0;  ///< times that a cloud could not be read back, so that a candidate was refused
   int solver_rebuilds = 0;
+  std::string solver_failure;   ///< why the graph takes nothing any more; empty while all is well
   int shadow_checks = 0;        ///< batch solutions that were compared with the incremental one
   int shadow_swaps = 0;         ///< of these, so far away that they took its place
   double shadow_gap_m = 0.0;    ///< largest distance of a keyframe from its place in the newest batch solution

@@ -178,11 +178,17 @@ std::vector<Keyframe> numerically_hopeless(std::vector<Keyframe> keyframes, unsi
   return keyframes;
 }
 
-TEST(Smoother, DropsAKeyframeThatTheSolverRefusesAndStaysAsItWas) {
+/// What makes such odometry believed.
+BackendConfig trusting_odometry() {
   BackendConfig config = without_loops();
   config.odometry_floor_m = 1e-6;
   config.odometry_floor_rad = 1e-7;
   config.scan_information_scale = 1.0;
+  return config;
+}
+
+TEST(Smoother, DropsAKeyframeThatTheSolverRefusesAndStaysAsItWas) {
+  const BackendConfig config = trusting_odometry();
   const testing::Drive drive = testing::make_drive({.keyframes = 25});
   int refusals = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
@@ -204,6 +210,31 @@ TEST(Smoother, DropsAKeyframeThatTheSolverRefusesAndStaysAsItWas) {
     EXPECT_EQ(smoother.stats().invalid + smoother.stats().keyframes, 25);
   }
   EXPECT_GT(refusals, 0);
+}
+
+TEST(Fault_G4, ASolverThatCannotEvenBeRebuiltSaysSoAndKeepsItsLastSolution) {
+  const BackendConfig config = trusting_odometry();
+  const testing::Drive drive = testing::make_drive({.keyframes = 25});
+  int broken = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Smoother smoother(config, LoopGates());
+    std::vector<Pose> last;
+    for (const Keyframe& keyframe : numerically_hopeless(drive.keyframes, seed)) {
+      const std::string failure = smoother.stats().solver_failure;
+      const SmootherUpdate update = smoother.add_keyframe(keyframe);
+      if (!failure.empty()) {
+        EXPECT_EQ(update.reason, failure) << "whatever comes is refused, with the reason";
+        EXPECT_EQ(smoother.stats().solver_failure, failure);
+        ASSERT_EQ(poses_of(smoother).size(), last.size());
+        for (std::size_t i = 0; i < last.size(); ++i) EXPECT_EQ(poses_of(smoother)[i].translation, last[i].translation);
+      }
+      last = poses_of(smoother);
+    }
+    if (smoother.stats().solver_failure.empty()) continue;
+    ++broken;
+    EXPECT_TRUE(contains(smoother.stats().solver_failure, "cannot be rebuilt"));
+  }
+  EXPECT_GT(broken, 0);
 }
 
 TEST(Smoother, DoesWithoutImuThatIsIncompleteOrBroken) {

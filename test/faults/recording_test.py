@@ -83,6 +83,11 @@ class Recorder:
         entry = self.listener.health.get(("ignis_record", self.process.pid))
         return entry is not None and entry[1].state == state
 
+    def kill_logger(self) -> None:
+        """Ends the logger that writes now, at once."""
+        (logger,) = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        os.kill(int(logger), signal.SIGKILL)
+
     def end(self) -> tuple[int, str]:
         """Ctrl-C; exit code and all that was said."""
         self.process.send_signal(signal.SIGINT)
@@ -126,8 +131,7 @@ def test_fault_p6_a_killed_logger_is_succeeded_within_a_second_in_a_new_file(
     log, second = tmp_path / "drive.lcmlog", tmp_path / "drive-2.lcmlog"
     with Recorder(log) as recorder:
         recorder.send_until(lambda: log.exists() and recorder.sent > 250)  # a logger that dies at once is a refusal
-        (logger,) = Path(f"/proc/{recorder.process.pid}/task/{recorder.process.pid}/children").read_text().split()
-        os.kill(int(logger), signal.SIGKILL)
+        recorder.kill_logger()
         took = recorder.send_until(second.exists)
         recorder.send_until(lambda: second.stat().st_size > 1_500_000)
         code, said = recorder.end()
@@ -135,3 +139,22 @@ def test_fault_p6_a_killed_logger_is_succeeded_within_a_second_in_a_new_file(
     assert code == 3 and "interrupted: lcm-logger ended with code -9" in said
     assert recorded_config(log) is not None and recorded_config(second) is not None
     assert len(numbers(log)) > 100 and len(numbers(second)) > 10
+
+
+def test_fault_p6_a_successor_that_is_killed_as_soon_as_it_began_is_succeeded_as_well(
+    private_network: None, tmp_path: Path
+) -> None:
+    log, second, third = (tmp_path / f"drive{part}.lcmlog" for part in ("", "-2", "-3"))
+    with Recorder(log) as recorder:
+        recorder.send_until(lambda: log.exists() and recorder.sent > 250)
+        recorder.kill_logger()
+        recorder.send_until(second.exists)
+        recorder.kill_logger()
+        recorder.send_until(lambda: recorder.says(health_t.FAULT))
+        took = recorder.send_until(third.exists)
+        recorder.send_until(lambda: third.stat().st_size > 1_500_000)
+        assert recorder.says(health_t.OK)
+        code, said = recorder.end()
+    assert took < 3.0 + BUSY_S
+    assert code == 3 and said.count("lcm-logger ended with code -9") >= 2
+    assert recorded_config(third) is not None and len(numbers(third)) > 10

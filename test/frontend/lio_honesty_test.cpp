@@ -67,6 +67,11 @@ TEST(LioHonesty, ErrorsOfFiveDrivesAreWhatTheCovarianceSays) {
   // Heading is zero by definition at the start, so two of the three degrees of freedom are drawn: 5 x 2, per 5 x 3.
   EXPECT_GT(mean.attitude, 3.25 / 15.0);
   EXPECT_LT(mean.attitude, 20.48 / 15.0);
+  // Residuals of scans that follow each other are not independent, so their variance is told `residual_inflation` times
+  // as large on purpose. An innovation is part residual, part prediction: its square is expected between one over the
+  // inflation and one. Above, the filter believes too much; below, too little even for that.
+  EXPECT_GT(mean.nis, 1.0 / test::tuned_config().residual_inflation);
+  EXPECT_LT(mean.nis, 1.0);
 }
 
 }  // namespace

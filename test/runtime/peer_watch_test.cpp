@@ -75,6 +75,32 @@ TEST(PeerWatch, BelievesInASecondInstanceOnlyWhenItGoesOn) {
   EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 9)");
 }
 
+TEST(Fault_B7, TwoInstancesOfAnotherProcessAreNamedOnceBothHaveGoneOn) {
+  PeerWatch watch(kSelf);
+  const std::string both = "two instances of l1_driver are on the bus (processes 7 and 8)";
+  for (int i = 0; i < 3; ++i) {
+    watch.observe(peer("l1_driver", 7), i);
+    watch.observe(peer("l1_driver", 8), i + 0.5);
+    EXPECT_EQ(watch.trouble(i + 0.6), i < 2 ? "" : both) << i;
+  }
+  EXPECT_TRUE(watch.needs_person(2.6));
+  watch.observe(peer("l1_driver", 7), 4.4);
+  EXPECT_EQ(watch.trouble(5.4), both) << "the second one may only be late";
+  EXPECT_EQ(watch.trouble(5.6), "");
+}
+
+TEST(Fault_B7, OneThatIsStartedAnewAndToolsAreNoTwoInstances) {
+  PeerWatch watch(kSelf);
+  PeerIdentity tool = peer("ignis_record", 1);
+  tool.config_hash.clear();
+  for (int i = 0; i < 12; ++i) {
+    watch.observe(peer("l1_driver", i < 6 ? 7 : 8), 0.5 * i);
+    tool.pid = i % 2;
+    watch.observe(tool, 0.5 * i);
+    EXPECT_EQ(watch.trouble(0.5 * i + 0.1), "") << i;
+  }
+}
+
 TEST(Fault_P7, AProcessThatIsStartedFiveTimesWithinAMinuteIsNamedUntilItStays) {
   PeerWatch watch(kSelf);
   for (int start = 0; start < 5; ++start) {
