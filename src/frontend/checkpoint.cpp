@@ -15,7 +15,7 @@ namespace {
 constexpr std::array<char, 8> kMagic{'I', 'G', 'N', 'I', 'S', 'F', 'E', 'C'};
 
 constexpr std::size_t kBytesBesideMap = 1U << 18U;  // about
-constexpr std::size_t kBytesPerMapPoint = 24;       // about: its block has a share in it
+constexpr std::size_t kBytesPerMapPoint = 36;       // about: its block has a share in it
 
 struct Head {
   std::array<char, 8> magic = kMagic;

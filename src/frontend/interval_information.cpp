@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "frontend/scan_update.h"
+#include "frontend/steady_motion.h"
 
 namespace ignis {
 namespace {
@@ -52,10 +53,7 @@ void IntervalInformation::add_imu(const ImuSample& sample) {
 }
 
 InertialInput IntervalInformation::mean_input() const {
-  if (samples_ == 0) {
-    const Eigen::Vector3d down_body = state_.T_odom_body.rotation.conjugate() * state_.gravity_direction();
-    return {state_.angular_rate + state_.gyro_bias, state_.accel_bias - config_.gravity_m * down_body};
-  }
+  if (samples_ == 0) return steady_input(state_, config_.gravity_m);
   return {sum_.gyro / samples_, sum_.accel / samples_};
 }
 

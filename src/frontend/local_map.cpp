@@ -25,7 +25,7 @@ LocalMap::LocalMap(const FrontendConfig& config)
       match_radius_(config.match_radius_m),
       window_(config.map_window_m),
       window_y_(config.map_window_y),
-      average_points_(config.map_average_points) {
+      average_points_(static_cast<float>(config.map_average_points)) {
   config::require_valid(config, "frontend");
   clear();
 }
@@ -36,12 +36,23 @@ Eigen::Vector3f LocalMap::Block::point(int bit) const {
   return {row.x[lane], row.y[lane], row.z[lane]};
 }
 
-void LocalMap::Block::set_point(int bit, const Eigen::Vector3f& local) {
+LocalMap::Voxel LocalMap::Block::voxel(int bit) const {
+  const Row& row = rows[bit / kEdge];
+  const int lane = bit % kEdge;
+  return {point(bit), row.weight[lane], row.scan[lane], {row.view_x[lane], row.view_y[lane], row.view_z[lane]}};
+}
+
+void LocalMap::Block::set_voxel(int bit, const Voxel& voxel) {
   Row& row = rows[bit / kEdge];
   const int lane = bit % kEdge;
-  row.x[lane] = local.x();
-  row.y[lane] = local.y();
-  row.z[lane] = local.z();
+  row.x[lane] = voxel.point.x();
+  row.y[lane] = voxel.point.y();
+  row.z[lane] = voxel.point.z();
+  row.weight[lane] = voxel.weight;
+  row.scan[lane] = voxel.scan;
+  row.view_x[lane] = voxel.view.x();
+  row.view_y[lane] = voxel.view.y();
+  row.view_z[lane] = voxel.view.z();
 }
 
 void LocalMap::clear() {
@@ -129,10 +140,11 @@ void LocalMap::insert_all(auto points, const Pose& T_odom_body, bool confirmed, 
         block_at = coordinate;
         corner = kEdge * voxel_size_ * coordinate.cast<double>();
       }
-      places[i] = {(point - corner).cast<float>(), block, bit_of(voxel - kEdge * coordinate)};
+      const Eigen::Vector3d view = (T_odom_body.translation - point).normalized();
+      places[i] = {(point - corner).cast<float>(), view.cast<float>(), block, bit_of(voxel - kEdge * coordinate)};
       const Block& there = blocks_[static_cast<std::size_t>(block)];
-      __builtin_prefetch(&there.rows[places[i].bit / kEdge]);
-      __builtin_prefetch(&there.weight[places[i].bit]);
+      __builtin_prefetch(&there.rows[places[i].bit / kEdge].x);
+      __builtin_prefetch(&there.rows[places[i].bit / kEdge].scan);
       __builtin_prefetch(&there.occupied);
     }
     for (const Place& place : std::span(places).first(count)) insert_point(place, confirmed);
@@ -144,26 +156,24 @@ void LocalMap::insert_point(const Place& place, bool confirmed) {
   Block& block = blocks_[static_cast<std::size_t>(place.block)];
   const int bit = place.bit;
   const std::uint64_t flag = std::uint64_t{1} << bit;
-  const Eigen::Vector3f& local = place.local;
-  float& scan = block.rows[bit / kEdge].scan[bit % kEdge];
+  const auto scan = static_cast<float>(scans_);
   const bool taken = (block.occupied & flag) != 0;
   const bool taken_confirmed = (block.confirmed & flag) != 0;
   if (taken_confirmed && !confirmed) return;
   const bool merges = taken && taken_confirmed == confirmed;
   if (merges && average_points_ > 1) {
-    std::uint16_t& weight = block.weight[bit];
-    if (weight < average_points_) ++weight;
-    const float share = 1.0F / static_cast<float>(weight);
-    const Eigen::Vector3f stored = block.point(bit);
-    block.set_point(bit, stored + share * (local - stored));
-    scan += share * (static_cast<float>(scans_) - scan);
+    Voxel voxel = block.voxel(bit);
+    voxel.weight = std::min(voxel.weight + 1.0F, average_points_);
+    const float share = 1.0F / voxel.weight;
+    voxel.point += share * (place.local - voxel.point);
+    voxel.scan += share * (scan - voxel.scan);
+    voxel.view += share * (place.view - voxel.view);
+    block.set_voxel(bit, voxel);
     return;
   }
-  if (merges && !nearer_to_centre(local, block.point(bit), bit)) return;
+  if (merges && !nearer_to_centre(place.local, block.point(bit), bit)) return;
   if (!taken) ++size_;
-  block.set_point(bit, local);
-  scan = static_cast<float>(scans_);
-  block.weight[bit] = 1;
+  block.set_voxel(bit, {place.local, 1.0F, scan, place.view});
   block.occupied |= flag;
   if (confirmed) block.confirmed |= flag;
 }
@@ -174,9 +184,9 @@ bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vecto
   return (point - centre).squaredNorm() < (stored - centre).squaredNorm();
 }
 
-NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius) const {
+NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius, const Eigen::Vector3d& side) const {
   const Box box = box_around(query, radius);
-  RowSums sums(radius);
+  RowSums sums(radius, side.cast<float>());
   for_each_block(box, [&](const Block& block) {
     const Eigen::Vector3f local = relative_to(block, query);
     for_each_row(block, box, [&](const Row& row, std::uint32_t lanes) { sums.add(row, lanes, local); });

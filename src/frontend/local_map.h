@@ -18,8 +18,9 @@
 namespace ignis {
 
 /// The cloud that scans are matched against: one point per voxel in a window that slides with the vehicle. Frame odom,
-/// metres. The point is the one nearest the voxel's centre or, with map_average_points above 1, the mean of all that
-/// fell into the voxel, the newest counting at least 1 / map_average_points: range noise averages out.
+/// metres. The point is the one nearest the voxel's centre, with weight 1, or, with map_average_points above 1, the
+/// mean of all that fell into the voxel, with their number as its weight and the newest counting at least 1 /
+/// map_average_points: range noise averages out. Each remembers from where it was seen: a thin wall has two sides.
 ///
 /// Voxels live in blocks of 4x4x4, blocks in regions of 4x4x4, with one bit of occupancy each; regions are found by
 /// open addressing. A neighbourhood is one or two regions, bit masks, and the rows of four voxels that these leave, a
@@ -35,8 +36,10 @@ class LocalMap {
   void insert(std::span<const Eigen::Vector3f> points_body, const Pose& T_odom_body, bool confirmed);
   void insert(std::span<const CloudPoint> cloud_body, const Pose& T_odom_body, bool confirmed);
 
-  /// Sums over the confirmed points within a radius [m] of a point.
-  [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query, double radius) const;
+  /// Sums over the confirmed points within a radius [m] of a point that were seen from the side of a plane that `side`
+  /// points to; zero: from any.
+  [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query, double radius,
+                                        const Eigen::Vector3d& side = Eigen::Vector3d::Zero()) const;
   /// The same for the match radius.
   [[nodiscard]] NeighbourMoments gather(const Eigen::Vector3d& query) const { return gather(query, match_radius_); }
 
@@ -61,12 +64,24 @@ class LocalMap {
   static constexpr int kEdge = 4;
   static constexpr int kCells = kEdge * kEdge * kEdge;
 
-  /// Four voxels along x. All coordinates in one line of the cache, each ready for a vector register.
-  struct alignas(64) Row {
+  /// Four voxels along x, each number ready for a vector register: two lines of the cache.
+  struct alignas(128) Row {
     float x[kEdge] = {};  ///< [m] relative to the block's corner
     float y[kEdge] = {};
     float z[kEdge] = {};
-    float scan[kEdge] = {};  ///< mean number of the scans that the point comes from
+    float weight[kEdge] = {};  ///< points in the mean
+    float scan[kEdge] = {};    ///< mean number of the scans that these come from
+    float view_x[kEdge] = {};  ///< mean unit vector from them to the sensor
+    float view_y[kEdge] = {};
+    float view_z[kEdge] = {};
+  };
+
+  /// What a row holds of one voxel.
+  struct Voxel {
+    Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< [m] relative to the block's corner
+    float weight = 0.0F;
+    float scan = 0.0F;
+    Eigen::Vector3f view = Eigen::Vector3f::Zero();
   };
 
   struct Block {
@@ -74,15 +89,16 @@ class LocalMap {
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of block edges
     std::uint64_t occupied = 0;
     std::uint64_t confirmed = 0;
-    std::uint16_t weight[kCells] = {};  ///< points in the mean
 
     [[nodiscard]] Eigen::Vector3f point(int bit) const;  ///< [m] relative to the block's corner
-    void set_point(int bit, const Eigen::Vector3f& local);
+    [[nodiscard]] Voxel voxel(int bit) const;
+    void set_voxel(int bit, const Voxel& voxel);
   };
 
   /// Where a point goes.
   struct Place {
     Eigen::Vector3f local;  ///< [m] relative to the block's corner
+    Eigen::Vector3f view;   ///< unit vector to the sensor
     std::int32_t block;     ///< index into blocks_
     int bit;                ///< voxel within the block
   };
@@ -122,7 +138,7 @@ class LocalMap {
   double match_radius_;
   double window_;
   double window_y_;
-  int average_points_;
+  float average_points_;
   std::vector<Block> blocks_;
   std::vector<Region> regions_;
   std::vector<std::int32_t> table_;  ///< index into regions_, -1 when free; power of two, at most half full
@@ -139,14 +155,12 @@ class LocalMap {
     io.number(block.confirmed);
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
       const int bit = std::countr_zero(left);
-      auto& scan = block.rows[bit / kEdge].scan[bit % kEdge];
-      const Eigen::Vector3f point = block.point(bit);
-      Eigen::Matrix<float, 5, 1> voxel(point.x(), point.y(), point.z(), scan, block.weight[bit]);
-      io.matrix(voxel);
-      if constexpr (requires { block.weight[bit] = 0; }) {
-        block.set_point(bit, voxel.head<3>());
-        scan = voxel[3];
-        block.weight[bit] = static_cast<std::uint16_t>(voxel[4]);
+      const Voxel voxel = block.voxel(bit);
+      Eigen::Matrix<float, 8, 1> numbers;
+      numbers << voxel.point, voxel.weight, voxel.scan, voxel.view;
+      io.matrix(numbers);
+      if constexpr (requires { block.set_voxel(bit, voxel); }) {
+        block.set_voxel(bit, {numbers.head<3>(), numbers[3], numbers[4], numbers.tail<3>()});
       }
     }
   }

@@ -9,13 +9,14 @@
 namespace ignis {
 
 std::span<const NeighbourMoments> NeighbourSearch::gather(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
-                                                          double radius) {
+                                                          double radius, std::span<const Eigen::Vector3d> sides) {
   moments_.clear();
   for (; !queries.empty(); queries = queries.subspan(std::min(kTogether, queries.size()))) {
     const std::span<const Eigen::Vector3d> together = queries.first(std::min(kTogether, queries.size()));
     find_blocks(map, together, radius);
     find_rows(map, together);
-    add_rows(together.size(), radius);
+    add_rows(together.size(), radius, sides);
+    sides = sides.subspan(std::min(together.size(), sides.size()));
   }
   return moments_;
 }
@@ -37,17 +38,19 @@ void NeighbourSearch::find_rows(const LocalMap& map, std::span<const Eigen::Vect
   for (const auto& [block, query] : blocks_) {
     const Eigen::Vector3f local = map.relative_to(*block, queries[query]);
     LocalMap::for_each_row(*block, boxes_[query], [&](const LocalMap::Row& row, std::uint32_t lanes) {
-      __builtin_prefetch(&row);
+      __builtin_prefetch(&row.x);
+      __builtin_prefetch(&row.scan);
       rows_.push_back({&row, lanes, local});
     });
     row_ends_[query] = rows_.size();
   }
 }
 
-void NeighbourSearch::add_rows(std::size_t queries, double radius) {
+void NeighbourSearch::add_rows(std::size_t queries, double radius, std::span<const Eigen::Vector3d> sides) {
   std::size_t next = 0;
   for (std::size_t i = 0; i < queries; ++i) {
-    RowSums sums(radius);
+    const Eigen::Vector3d side = sides.empty() ? Eigen::Vector3d::Zero().eval() : sides[i];
+    RowSums sums(radius, side.cast<float>());
     for (; next < row_ends_[i]; ++next) sums.add(*rows_[next].row, rows_[next].lanes, rows_[next].query);
     moments_.push_back(sums.moments());
   }

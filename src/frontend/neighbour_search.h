@@ -14,9 +14,10 @@ namespace ignis {
 /// they all need is asked for before the first of them is worked on. Keeps its memory from scan to scan.
 class NeighbourSearch {
  public:
-  /// One for each query, the same to the bit as by LocalMap::gather; valid until the next call.
+  /// One for each query, the same to the bit as by LocalMap::gather; valid until the next call. `sides`: one for each
+  /// query, or none at all.
   [[nodiscard]] std::span<const NeighbourMoments> gather(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
-                                                         double radius);
+                                                         double radius, std::span<const Eigen::Vector3d> sides = {});
 
  private:
   static constexpr std::size_t kTogether = 16;
@@ -33,7 +34,7 @@ class NeighbourSearch {
 
   void find_blocks(const LocalMap& map, std::span<const Eigen::Vector3d> queries, double radius);
   void find_rows(const LocalMap& map, std::span<const Eigen::Vector3d> queries);
-  void add_rows(std::size_t queries, double radius);
+  void add_rows(std::size_t queries, double radius, std::span<const Eigen::Vector3d> sides);
 
   std::array<LocalMap::Box, kTogether> boxes_;
   std::array<std::size_t, kTogether> row_ends_;  ///< [query] end of its rows in rows_

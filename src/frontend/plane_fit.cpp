@@ -12,15 +12,16 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   PlaneFit fit;
   if (moments.count < config.min_plane_points) return fit;
 
-  const double inverse_count = 1.0 / moments.count;
-  fit.offset = moments.sum * inverse_count;
-  const Eigen::Matrix3d scatter = moments.sum_outer * inverse_count - fit.offset * fit.offset.transpose();
+  const double inverse_weight = 1.0 / moments.weight;
+  fit.offset = moments.sum * inverse_weight;
+  const Eigen::Matrix3d scatter = moments.sum_outer * inverse_weight - fit.offset * fit.offset.transpose();
   const ScatterAxes axes = scatter_axes(scatter);
   const Eigen::Vector3d lambda = axes.values.cwiseMax(0.0);
   fit.normal = axes.vectors.col(0);
   fit.count = moments.count;
   fit.scatter = lambda;
-  fit.mean_scan = moments.scan_sum * inverse_count;
+  fit.mean_scan = moments.scan_sum * inverse_weight;
+  fit.view = moments.view_sum * inverse_weight;
 
   const double tangential = (fit.offset - fit.normal * fit.normal.dot(fit.offset)).norm();
   if (!(lambda[0] < config.max_curvature * lambda[2])) {
@@ -39,6 +40,13 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
     fit.normal_sigma.col(1) = std::sqrt(across / lambda[2]) * axes.vectors.col(2);
   }
   return fit;
+}
+
+bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view) {
+  constexpr double kFlat = 0.1;  // rad
+  const double now = plane.normal.dot(view);
+  const double then = plane.normal.dot(plane.view);
+  return std::abs(now) > kFlat && std::abs(then) > kFlat && (now > 0.0) != (then > 0.0);
 }
 
 }  // namespace ignis

@@ -7,20 +7,33 @@
 
 namespace ignis {
 
+/// A neighbour of a query point.
+struct Neighbour {
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< [m] neighbour - query
+  double weight = 1.0;                               ///< measured points that it is the mean of
+  double scan = 0.0;                                 ///< mean number of the scans that these come from
+  Eigen::Vector3d view = Eigen::Vector3d::Zero();    ///< mean unit vector to where they were seen from
+};
+
 /// Sums over the neighbours of a query point, relative to that point: all that a plane fit needs, so that no list of
-/// neighbours is ever built.
+/// neighbours is ever built. All but the count are weighted: a plane near the border of a voxel leaves a few stray
+/// points beyond it, and with equal weights the mean of these few would pull the plane over the border.
 struct NeighbourMoments {
   int count = 0;
-  double scan_sum = 0.0;                                ///< [scans] of the neighbours' mean scan numbers
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();        ///< [m] of (neighbour - query)
+  double weight = 0.0;
+  double scan_sum = 0.0;  ///< [scans]
+  Eigen::Vector3d view_sum = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();        ///< [m] of the offsets
   Eigen::Matrix3d sum_outer = Eigen::Matrix3d::Zero();  ///< [m^2]
 
-  /// One neighbour: the reference for LocalMap::gather, which sums rows of four voxels.
-  void add(const Eigen::Vector3d& offset, double scan = 0.0) {
+  /// The reference for LocalMap::gather, which sums rows of four voxels.
+  void add(const Neighbour& neighbour) {
     ++count;
-    scan_sum += scan;
-    sum += offset;
-    sum_outer += offset * offset.transpose();
+    weight += neighbour.weight;
+    scan_sum += neighbour.weight * neighbour.scan;
+    view_sum += neighbour.weight * neighbour.view;
+    sum += neighbour.weight * neighbour.offset;
+    sum_outer += neighbour.weight * neighbour.offset * neighbour.offset.transpose();
   }
 };
 
@@ -37,6 +50,8 @@ struct PlaneFit {
   int count = 0;                                      ///< neighbours
   Eigen::Vector3d scatter = Eigen::Vector3d::Zero();  ///< [m^2] their variance across the plane and in it, ascending
   double mean_scan = 0.0;  ///< [scans] mean number of the scans that the neighbours come from
+  Eigen::Vector3d view =
+      Eigen::Vector3d::Zero();  ///< mean unit vector from the neighbours to where they were seen from
 };
 
 /// Principal component fit with the reference's gates: number, curvature, spread, one-sidedness, roughness.
@@ -48,5 +63,9 @@ struct PlaneFit {
 [[nodiscard]] inline PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config) {
   return fit_plane(moments, config, config.match_radius_m);
 }
+
+/// True when the neighbours were seen from one side of their plane and `view`, a unit vector to the sensor, is on the
+/// other: they are the far face of a wall. Seen at a flat angle, errors of the normal decide, so that says nothing.
+[[nodiscard]] bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view);
 
 }  // namespace ignis

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "frontend/lio.h"
+#include "frontend/steady_motion.h"
 
 namespace ignis {
 namespace {
@@ -67,12 +68,12 @@ void Lio::coast_to(Utime utime) {
   while (imu_.newest() < utime) {
     ImuSample sample;
     sample.utime = imu_.newest() + kCoastingStepUs;
-    sample.gyro = live_.angular_rate + live_.gyro_bias;
-    sample.accel =
-        live_.T_odom_body.rotation.conjugate() * (-config_.gravity_m * live_.gravity_direction()) + live_.accel_bias;
+    const InertialInput steady = steady_input(live_, config_.gravity_m);
+    sample.gyro = steady.gyro;
+    sample.accel = steady.accel;
     imu_.add_coasting(sample);
     last_clipped_ = sample.utime;
-    live_ = predict_nominal(live_, {sample.gyro, sample.accel}, 1e-6 * kCoastingStepUs, config_.gravity_m);
+    live_ = predict_nominal(live_, steady, 1e-6 * kCoastingStepUs, config_.gravity_m);
     live_.utime = sample.utime;
   }
 }

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <format>
 
-#include "common/so3.h"
 #include "frontend/lio.h"
+#include "frontend/steady_motion.h"
 
 namespace ignis {
 namespace {
@@ -15,30 +15,6 @@ constexpr double kConfirmationSeconds = 2.0;     // that a resumption has
 constexpr int kContradictionsOfAWrongPlace = 3;  // in a row; single ones come in any curve
 constexpr double kSilenceSeconds = 0.3;          // of inertial samples and scans, that two samples cannot stand for
 constexpr double kLongestSilence = 3.0;          // s: the longest that is bridged
-constexpr double kUnknownAccel = 1.0;            // [m/s^2] sigma of what a vehicle may do meanwhile
-constexpr double kUnknownTurn = 0.1;             // [rad/s] sigma
-
-/// Speed and turn rate go on, in body axes; what the vehicle did beside is unknown.
-void go_on_blindly(FilterState& filter, double seconds) {
-  NavState& state = filter.nominal;
-  const Eigen::Quaterniond turn = so3::exp(state.angular_rate * seconds);
-  const Eigen::Vector3d v_body = state.T_odom_body.rotation.conjugate() * state.v_odom;
-  const Eigen::Vector3d v_before = state.v_odom;
-  state.T_odom_body.rotation = (state.T_odom_body.rotation * turn).normalized();
-  state.v_odom = state.T_odom_body.rotation * v_body;
-  state.T_odom_body.translation += 0.5 * seconds * (v_before + state.v_odom);
-  state.utime += to_micros(seconds);
-  const double gain = kUnknownAccel * seconds;
-  const double shift = 0.5 * gain * seconds;
-  ErrorCovariance transition = ErrorCovariance::Identity();
-  transition.block<3, 3>(kPosition, kVelocity) = seconds * Eigen::Matrix3d::Identity();
-  filter.covariance = transition * filter.covariance * transition.transpose();
-  filter.covariance.diagonal().segment<3>(kAttitude).array() += kUnknownTurn * seconds * kUnknownTurn * seconds;
-  filter.covariance.diagonal().segment<3>(kPosition).array() += shift * shift;
-  filter.covariance.diagonal().segment<3>(kVelocity).array() += gain * gain;
-  filter.covariance.block<3, 3>(kPosition, kVelocity).diagonal().array() += shift * gain;
-  filter.covariance.block<3, 3>(kVelocity, kPosition).diagonal().array() += shift * gain;
-}
 
 }  // namespace
 
@@ -67,9 +43,9 @@ Lio::Silence Lio::bridge_silence(Utime before, Utime sample, std::vector<ScanRes
   advance_to(before);
   const double blind = seconds_between(filter_.nominal.utime, sample);
   FilterState cautious{filter_.nominal, cautious_};
-  go_on_blindly(cautious, blind);
+  go_on_steadily(cautious, blind);
   cautious_ = cautious.covariance;
-  go_on_blindly(filter_, blind);
+  go_on_steadily(filter_, blind);
   filter_.nominal.utime = sample;
   live_ = filter_.nominal;
   keyframer_.note_gap();

@@ -13,35 +13,48 @@ namespace ignis {
 /// 64-bit x86 or ARM. NeighbourMoments::add is the reference.
 class RowSums {
  public:
-  /// Of the points within `radius` [m].
-  explicit RowSums(double radius) : radius2_(all(static_cast<float>(radius * radius))) {}
+  /// Of the points within `radius` [m] that were seen from the side that `side` points to; zero: from any.
+  RowSums(double radius, const Eigen::Vector3f& side)
+      : radius2_(all(static_cast<float>(radius * radius))), side_(side) {}
 
-  /// `row` has four x, y, z [m] and `scan`; bit k of `lanes` says that its voxel k counts. `query` in the row's frame.
+  /// `row` has four each of x, y, z [m], `weight`, `scan` and the direction `view_x` to `view_z`; bit k of `lanes` says
+  /// that its voxel k counts. `query` in the row's frame.
   void add(const auto& row, std::uint32_t lanes, const Eigen::Vector3f& query) {
     Lanes dx = load(row.x) - all(query.x());
     Lanes dy = load(row.y) - all(query.y());
     Lanes dz = load(row.z) - all(query.z());
-    const LaneMask near = (dx * dx + dy * dy + dz * dz <= radius2_) & std::bit_cast<LaneMask>(kMasks[lanes]);
-    dx = near ? dx : Lanes{};
-    dy = near ? dy : Lanes{};
-    dz = near ? dz : Lanes{};
+    const Lanes view_x = load(row.view_x);
+    const Lanes view_y = load(row.view_y);
+    const Lanes view_z = load(row.view_z);
+    const LaneMask near = (dx * dx + dy * dy + dz * dz <= radius2_) & std::bit_cast<LaneMask>(kMasks[lanes]) &
+                          (view_x * all(side_.x()) + view_y * all(side_.y()) + view_z * all(side_.z()) >= Lanes{});
+    const Lanes weight = near ? load(row.weight) : Lanes{};
     count_ -= near;
-    scan_ += near ? load(row.scan) : Lanes{};
-    x_ += dx;
-    y_ += dy;
-    z_ += dz;
-    xx_ += dx * dx;
-    xy_ += dx * dy;
-    xz_ += dx * dz;
-    yy_ += dy * dy;
-    yz_ += dy * dz;
-    zz_ += dz * dz;
+    weight_ += weight;
+    scan_ += weight * load(row.scan);
+    view_x_ += weight * view_x;
+    view_y_ += weight * view_y;
+    view_z_ += weight * view_z;
+    const Lanes wx = weight * dx;
+    const Lanes wy = weight * dy;
+    const Lanes wz = weight * dz;
+    x_ += wx;
+    y_ += wy;
+    z_ += wz;
+    xx_ += wx * dx;
+    xy_ += wx * dy;
+    xz_ += wx * dz;
+    yy_ += wy * dy;
+    yz_ += wy * dz;
+    zz_ += wz * dz;
   }
 
   [[nodiscard]] NeighbourMoments moments() const {
     NeighbourMoments moments;
     moments.count = count_[0] + count_[1] + count_[2] + count_[3];
+    moments.weight = sum(weight_);
     moments.scan_sum = sum(scan_);
+    moments.view_sum << sum(view_x_), sum(view_y_), sum(view_z_);
     moments.sum << sum(x_), sum(y_), sum(z_);
     moments.sum_outer << sum(xx_), sum(xy_), sum(xz_), sum(xy_), sum(yy_), sum(yz_), sum(xz_), sum(yz_), sum(zz_);
     return moments;
@@ -68,8 +81,10 @@ class RowSums {
   }
 
   Lanes radius2_;
+  Eigen::Vector3f side_;
   LaneMask count_{};
-  Lanes scan_{};
+  Lanes weight_{}, scan_{};
+  Lanes view_x_{}, view_y_{}, view_z_{};
   Lanes x_{}, y_{}, z_{};
   Lanes xx_{}, xy_{}, xz_{}, yy_{}, yz_{}, zz_{};
 };

@@ -101,7 +101,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
     const auto points = points_body.subspan(begin, std::min(kPointsTogether, points_body.size() - begin));
     queries_.clear();
     for (const Eigen::Vector3f& point : points) queries_.emplace_back(R * point.cast<double>() + pose.translation);
-    find_planes(map);
+    find_planes(map, pose.translation);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const PlaneFit& plane = planes_[i];
       if (plane.verdict != PlaneVerdict::kPlane) continue;
@@ -118,24 +118,40 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   pooled_variance_ = variance_sum / count;
 }
 
-void ScanMatcher::find_planes(const LocalMap& map) {
-  lonely_.clear();
-  lonely_at_.clear();
-  planes_.clear();
-  for (const NeighbourMoments& moments : search_.gather(map, queries_, config_.match_radius_m)) {
-    planes_.push_back(fit_plane(moments, config_));
-  }
+void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& sensor) {
+  planes_.assign(queries_.size(), {});
+  chosen_.clear();
+  for (std::size_t i = 0; i < queries_.size(); ++i) chosen_.push_back(i);
+  fit_chosen(map, sensor, config_, config_.match_radius_m);
   // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
   // where it is not.
   const double radius = config_.wide_match_radius_m;
   if (!(radius > 0.0)) return;
+  chosen_.clear();
   for (std::size_t i = 0; i < planes_.size(); ++i) {
-    if (planes_[i].verdict != PlaneVerdict::kTooFewPoints) continue;
-    lonely_.push_back(queries_[i]);
-    lonely_at_.push_back(i);
+    if (planes_[i].verdict == PlaneVerdict::kTooFewPoints) chosen_.push_back(i);
   }
-  const std::span<const NeighbourMoments> wide = search_.gather(map, lonely_, radius);
-  for (std::size_t i = 0; i < wide.size(); ++i) planes_[lonely_at_[i]] = fit_plane(wide[i], wide_config_, radius);
+  fit_chosen(map, sensor, wide_config_, radius);
+}
+
+/// Planes of the chosen queries. Where one was seen from its other side, it is that of the points seen from this side.
+void ScanMatcher::fit_chosen(const LocalMap& map, const Eigen::Vector3d& sensor, const FrontendConfig& config,
+                             double radius) {
+  const auto fit = [&](std::span<const Eigen::Vector3d> sides) {
+    chosen_queries_.clear();
+    for (const std::size_t i : chosen_) chosen_queries_.push_back(queries_[i]);
+    const std::span<const NeighbourMoments> moments = search_.gather(map, chosen_queries_, radius, sides);
+    for (std::size_t k = 0; k < chosen_.size(); ++k) planes_[chosen_[k]] = fit_plane(moments[k], config, radius);
+  };
+  fit({});
+  sides_.clear();
+  std::erase_if(chosen_, [&](std::size_t i) {
+    const Eigen::Vector3d view = (sensor - queries_[i]).normalized();
+    const bool other = is_seen_from_other_side(planes_[i], view);
+    if (other) sides_.push_back(planes_[i].normal.dot(view) > 0.0 ? planes_[i].normal : -planes_[i].normal);
+    return !other;
+  });
+  if (!chosen_.empty()) fit(sides_);
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {

@@ -71,7 +71,8 @@ class ScanMatcher {
 
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
   /// Replaces planes_ by those nearest to queries_.
-  void find_planes(const LocalMap& map);
+  void find_planes(const LocalMap& map, const Eigen::Vector3d& sensor);
+  void fit_chosen(const LocalMap& map, const Eigen::Vector3d& sensor, const FrontendConfig& config, double radius);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);
@@ -98,8 +99,9 @@ class ScanMatcher {
   NeighbourSearch search_;
   std::vector<Eigen::Vector3d> queries_;  ///< [m] odom frame; of some points
   std::vector<PlaneFit> planes_;          ///< [query]
-  std::vector<Eigen::Vector3d> lonely_;   ///< those of queries_ with too few neighbours
-  std::vector<std::size_t> lonely_at_;    ///< their places in queries_
+  std::vector<std::size_t> chosen_;       ///< those of queries_ that planes are sought for
+  std::vector<Eigen::Vector3d> chosen_queries_;
+  std::vector<Eigen::Vector3d> sides_;  ///< normals that point to the side that they are seen from
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;

@@ -103,8 +103,11 @@ bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, con
 std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
                                           const FrontendConfig& config) {
   const NavState& state = filter.nominal;
+  // A vehicle that stands without scans that hold it is seen to move by the noise of its IMU. Once the limit is missed
+  // nothing stops that any more, so it must be a rare noise.
   const double velocity_sigma = largest_sigma(filter.covariance, kVelocity);
-  const double speed_limit = std::min(config.stationary_speed + 2.0 * velocity_sigma, 3.0 * config.stationary_speed);
+  const double speed_limit =
+      std::min(config.stationary_speed + kSigmas * velocity_sigma, 4.0 * config.stationary_speed);
   if (velocity_sigma > kMaxVelocitySigma || state.v_odom.norm() > speed_limit) return std::nullopt;
 
   const auto begin = std::ranges::lower_bound(samples, state.utime - kStandstillWindowUs, {}, &ImuSample::utime);

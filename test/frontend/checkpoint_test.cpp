@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <map>
 
@@ -284,6 +286,33 @@ TEST(Checkpoint, DamageAtAnyByteIsNoticed) {
     ASSERT_NE(lio.start_note().find("new session"), std::string::npos) << i << ": " << lio.start_note();
     ASSERT_FALSE(lio.status().running) << i;
     ASSERT_EQ(lio.session(), i < head ? 0 : 1) << i;
+  }
+}
+
+/// Replaces a number wherever it stands in the bytes.
+void replace_number(std::vector<std::byte>& bytes, double number, double by) {
+  const auto old = std::bit_cast<std::array<std::byte, sizeof(double)>>(number);
+  const auto other = std::bit_cast<std::array<std::byte, sizeof(double)>>(by);
+  auto found = std::ranges::search(bytes, old);
+  ASSERT_FALSE(found.empty());
+  for (; !found.empty(); found = std::ranges::search(found.end(), bytes.end(), old.begin(), old.end())) {
+    std::ranges::copy(other, found.begin());
+  }
+}
+
+TEST(Checkpoint, AStateThatIsNoNumberIsNotSound) {
+  Lio lio(test::tuned_config());
+  const NavState state = feed(lio, drive(), 0.0, 6.0).scans.back().state;
+  ASSERT_TRUE(lio.is_sound());
+  for (const double number :
+       {state.T_odom_body.rotation.x(), state.T_odom_body.translation.y(), state.v_odom.z(), state.gyro_bias.x(),
+        state.accel_bias.y(), state.angular_rate.z(), state.gravity_tilt.x(), state.gravity_tilt.y()}) {
+    std::vector<std::byte> bytes = bytes_of(lio);
+    replace_number(bytes, number, std::nan(""));
+    ByteReader reader(bytes);
+    Lio damaged(test::tuned_config());
+    transfer(reader, damaged);
+    EXPECT_FALSE(damaged.is_sound()) << number;
   }
 }
 

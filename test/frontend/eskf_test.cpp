@@ -54,6 +54,34 @@ TEST(Eskf, TransitionEqualsNumericalDerivative) {
   }
 }
 
+TEST(Eskf, RestAccelerationCovarianceIsThatOfNumericalDerivatives) {
+  std::mt19937 random(11);
+  constexpr double kStep = 1e-6;
+  for (int trial = 0; trial < 20; ++trial) {
+    FilterState filter;
+    filter.nominal = random_state(random);
+    const ErrorCovariance root = ErrorCovariance::NullaryExpr([&] { return random_vector(random, 0.1).x(); });
+    filter.covariance = root * root.transpose();
+    // What an IMU at rest measures if the nominal state is right; the acceleration that a wrong state makes of it.
+    const Eigen::Matrix3d R = filter.nominal.T_odom_body.rotation.toRotationMatrix();
+    const InertialInput rest{
+        filter.nominal.gyro_bias,
+        filter.nominal.accel_bias - R.transpose() * (kGravity * filter.nominal.gravity_direction())};
+    const auto acceleration = [&](const ErrorVector& error) {
+      const NavState state = perturbed(filter.nominal, error);
+      return Eigen::Vector3d(state.T_odom_body.rotation * (rest.accel - state.accel_bias) +
+                             kGravity * state.gravity_direction());
+    };
+    Eigen::Matrix<double, 3, kErrorSize> J;
+    for (int i = 0; i < kErrorSize; ++i) {
+      const ErrorVector e = kStep * ErrorVector::Unit(i);
+      J.col(i) = (acceleration(e) - acceleration(-e)) / (2.0 * kStep);
+    }
+    const Eigen::Matrix3d expected = J * filter.covariance * J.transpose();
+    EXPECT_LT((rest_acceleration_covariance(filter, kGravity) - expected).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
 TEST(Eskf, DifferenceInvertsPerturbation) {
   std::mt19937 random(2);
   for (int trial = 0; trial < 20; ++trial) {

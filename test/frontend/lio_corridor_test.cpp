@@ -14,7 +14,7 @@ namespace {
 using test::Drive;
 using test::LioRun;
 
-test::World closed_corridor(double end_m = 10.0) {
+test::World closed_corridor(double end_m = 11.5) {
   test::World world = test::bare_corridor();
   world.room.lo.z() = -end_m;
   return world;

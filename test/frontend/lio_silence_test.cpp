@@ -73,10 +73,12 @@ TEST(Fault_P7, TheStateGoesOnOverASilenceOnceAndNotTwice) {
     auto scan = input.scans.begin();
     std::optional<NavState> after;
     int refused = 0;
+    int verdicts = 0;  // on the scan that waited, once the silence is over
     for (const ImuSample& sample : input.imu) {
       const ImuResult result = lio.add_imu(sample);
       for (const ScanResult& each : result.scans) refused += each.stats.reason == ScanReason::kNoImu ? 1 : 0;
       if (sample.utime >= to) {
+        verdicts = static_cast<int>(result.scans.size());
         after = result.state;
         break;
       }
@@ -86,6 +88,7 @@ TEST(Fault_P7, TheStateGoesOnOverASilenceOnceAndNotTwice) {
     const Pose truth = drive().truth(test::drive_seconds(drive(), after->utime));
     EXPECT_LT((after->T_odom_body.translation - truth.translation).norm(), 0.4) << "0.9 s at 1.3 m/s, in a curve";
     EXPECT_EQ(refused, waiting ? 1 : 0) << "its samples never came";
+    EXPECT_EQ(verdicts, refused) << "one scan, one verdict";
   }
 }
 

@@ -131,6 +131,23 @@ TEST(Lio, CorridorLeavesItsAxisToTheImuAndSaysSoAboveTheThreshold) {
   EXPECT_GT(P(5, 5), 20.0 * P(3, 3)) << "the axis of the corridor must not look observed";
 }
 
+TEST(Lio, PassesThroughADoorInAThinWallWithoutAStep) {
+  // The far face of the wall lies within the match radius of the face that the map knows.
+  test::World rooms = test::furnished_hall();
+  rooms.boxes = {{{rooms.room.lo.x(), rooms.room.lo.y(), -5.1}, {-0.6, rooms.room.hi.y(), -4.9}},
+                 {{0.6, rooms.room.lo.y(), -5.1}, {rooms.room.hi.x(), rooms.room.hi.y(), -4.9}}};
+  rooms.pillars.clear();
+  const Drive drive = test::simulate(rooms, test::straight_drive(3.0, 0.7), 12.5, Sensors{}, 3);
+  const LioRun run = run_lio(test::tuned_config(), drive);
+  double largest = 0.0;
+  for (const ScanResult& scan : run.scans) {
+    if (!scan.has_state) continue;
+    const Pose truth = drive.truth(test::drive_seconds(drive, scan.state.utime));
+    largest = std::max(largest, std::abs((scan.state.T_odom_body.translation - truth.translation).z()));
+  }
+  EXPECT_LT(largest, 0.05);
+}
+
 TEST(Lio, MovingStartAtTenMetresPerSecond) {
   Sensors sensors;
   sensors.car = true;
@@ -156,6 +173,20 @@ TEST(Lio, MovingStartAtTenMetresPerSecond) {
     EXPECT_GT(scan.keyframe->state.v_odom.norm(), 8.0) << "no keyframe before the velocity is known";
     EXPECT_TRUE(scan.keyframe->imu_complete) << "100 ms is this IMU's period, not a gap";
   }
+}
+
+TEST(Lio, AMovingStartCountsItsWayFromTheFirstScanAndNotFromTheFirstSample) {
+  Sensors sensors;
+  sensors.car = true;
+  sensors.max_range = 80.0;
+  Drive drive = test::simulate(test::street(), test::straight_drive(0.0, 10.0), 3.0, sensors, 2);
+  const Utime late = drive.imu.front().utime + to_micros(1.2);
+  std::erase_if(drive.scans, [&](const Scan& scan) { return scan.utime < late; });
+  const LioRun run = run_lio(car_config(), drive);
+  const auto first = std::ranges::find_if(run.scans, [](const ScanResult& scan) { return scan.stats.applied(); });
+  ASSERT_NE(first, run.scans.end());
+  EXPECT_LT(first - run.scans.begin(), 3) << "two scans, 50 ms apart, tell the velocity";
+  EXPECT_LT((first->state.v_odom - Eigen::Vector3d(0.0, 0.0, -10.0)).norm(), 1.5);
 }
 
 void expect_same(const std::vector<ScanResult>& a, const std::vector<ScanResult>& b) {

@@ -35,10 +35,11 @@ TEST(LocalMap, GathersExactlyWhatABruteForceSearchFinds) {
     const Eigen::Vector3d query = Eigen::Vector3d(100.0, -3.0, -50.0) + offset.cast<double>();
     NeighbourMoments expected;
     for (const Eigen::Vector3d& point : all) {
-      if ((point - query).norm() <= config.match_radius_m) expected.add(point - query);
+      if ((point - query).norm() <= config.match_radius_m) expected.add({.offset = point - query});
     }
     const NeighbourMoments found = map.gather(query);
     EXPECT_EQ(found.count, expected.count);
+    EXPECT_EQ(found.weight, expected.weight);
     EXPECT_LT((found.sum - expected.sum).norm(), 1e-4);
     EXPECT_LT((found.sum_outer - expected.sum_outer).norm(), 1e-4);
   }
@@ -53,14 +54,91 @@ TEST(NeighbourSearch, GathersForManyQueriesToTheBitWhatTheMapGathersForEach) {
   for (const int count : {0, 1, 16, 200, 37}) {
     std::vector<Eigen::Vector3d> queries;
     for (const Eigen::Vector3f& at : random_points(2, count, 6.0F)) queries.push_back(at.cast<double>());
-    const std::span<const NeighbourMoments> found = search.gather(map, queries, 0.45);
-    ASSERT_EQ(found.size(), queries.size());
-    for (std::size_t i = 0; i < queries.size(); ++i) {
-      const NeighbourMoments expected = map.gather(queries[i], 0.45);
-      ASSERT_EQ(found[i].count, expected.count);
-      ASSERT_EQ(found[i].scan_sum, expected.scan_sum);
-      ASSERT_EQ(found[i].sum, expected.sum);
-      ASSERT_EQ(found[i].sum_outer, expected.sum_outer);
+    std::vector<Eigen::Vector3d> sides;
+    for (const Eigen::Vector3f& side : random_points(4, count, 1.0F)) sides.push_back(side.cast<double>());
+    const auto expect_each = [&](std::span<const NeighbourMoments> found, const auto& side_of) {
+      ASSERT_EQ(found.size(), queries.size());
+      for (std::size_t i = 0; i < queries.size(); ++i) {
+        const NeighbourMoments expected = map.gather(queries[i], 0.45, side_of(i));
+        ASSERT_EQ(found[i].count, expected.count);
+        ASSERT_EQ(found[i].weight, expected.weight);
+        ASSERT_EQ(found[i].scan_sum, expected.scan_sum);
+        ASSERT_EQ(found[i].view_sum, expected.view_sum);
+        ASSERT_EQ(found[i].sum, expected.sum);
+        ASSERT_EQ(found[i].sum_outer, expected.sum_outer);
+      }
+    };
+    expect_each(search.gather(map, queries, 0.45), [](std::size_t) { return Eigen::Vector3d::Zero().eval(); });
+    expect_each(search.gather(map, queries, 0.45, sides), [&](std::size_t i) { return sides[i]; });
+  }
+}
+
+/// A wall at x = 1 whose points are seen from both sides: from the origin and from x = 2.
+TEST(LocalMap, GathersWhatWasSeenFromOneSideOfAPlane) {
+  FrontendConfig config;
+  config.map_average_points = 1000;
+  LocalMap map(config);
+  std::vector<Eigen::Vector3f> near_face;
+  std::vector<Eigen::Vector3f> far_face;
+  for (float y = -1.0F; y < 1.0F; y += 0.1F) {
+    for (float z = -1.0F; z < 1.0F; z += 0.1F) {
+      near_face.emplace_back(0.95F, y, z);
+      far_face.emplace_back(-0.85F, y, z);  // of a body at x = 2
+    }
+  }
+  map.insert(near_face, {}, true);
+  map.insert(far_face, {Eigen::Quaterniond::Identity(), {2.0, 0.0, 0.0}}, true);
+  const Eigen::Vector3d query(1.05, 0.1, 0.1);
+  const Eigen::Vector3d normal = Eigen::Vector3d::UnitX();
+  const NeighbourMoments both = map.gather(query, 0.4);
+  const NeighbourMoments front = map.gather(query, 0.4, -normal);
+  const NeighbourMoments back = map.gather(query, 0.4, normal);
+  EXPECT_EQ(both.count, front.count + back.count);
+  EXPECT_NEAR(front.sum.x() / front.weight, -0.10, 1e-6);
+  EXPECT_NEAR(back.sum.x() / back.weight, 0.10, 1e-6);
+  EXPECT_TRUE(is_seen_from_other_side(fit_plane(front, config, 0.4), normal));
+  EXPECT_FALSE(is_seen_from_other_side(fit_plane(front, config, 0.4), -normal));
+  EXPECT_FALSE(is_seen_from_other_side(fit_plane(front, config, 0.4), {0.05, 0.999, 0.0})) << "too flat to say";
+}
+
+/// Whatever the place of a plane in the grid, its noisy points are fitted where it is.
+TEST(LocalMap, AMeanOfManyPointsHasNoBiasTowardsTheGrid) {
+  constexpr float kSigma = 0.02F;
+  for (const int average : {1, 60000}) {
+    double worst = 0.0;
+    for (const double height : {0.0, 0.01, 0.02, 0.03, 0.04, 0.05}) {
+      FrontendConfig config;
+      config.voxel_size_m = 0.1;
+      config.match_radius_m = 0.15;
+      config.map_average_points = average;
+      LocalMap map(config);
+      std::mt19937 random(7);
+      std::normal_distribution<float> normal(0.0F, kSigma);
+      std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+      for (int scan = 0; scan < 200; ++scan) {
+        std::vector<Eigen::Vector3f> points;
+        for (int i = 0; i < 200; ++i) {
+          const float x = uniform(random);
+          const float z = uniform(random);
+          points.emplace_back(x, static_cast<float>(height) + normal(random), z);
+        }
+        map.insert(points, {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()}, true);
+      }
+      double sum = 0.0;
+      int count = 0;
+      for (double x = -0.7; x < 0.7; x += 0.05) {
+        for (double z = -0.7; z < 0.7; z += 0.05) {
+          const NeighbourMoments moments = map.gather({x, height, z});
+          sum += moments.sum.y() / moments.weight;
+          ++count;
+        }
+      }
+      worst = std::max(worst, std::abs(sum / count));
+    }
+    if (average == 1) {
+      EXPECT_GT(worst, 0.002) << "else this test shows nothing";
+    } else {
+      EXPECT_LT(worst, 0.001);
     }
   }
 }
@@ -123,7 +201,8 @@ TEST(LocalMap, KnowsWhichScansItsPointsComeFrom) {
   EXPECT_EQ(map.scans(), 4);
   const NeighbourMoments moments = map.gather({0.1, 0.1, 0.1});
   EXPECT_EQ(moments.count, 1);
-  EXPECT_NEAR(moments.scan_sum, 2.5, 1e-6);
+  EXPECT_EQ(moments.weight, 4.0);
+  EXPECT_NEAR(moments.scan_sum / moments.weight, 2.5, 1e-6);
 }
 
 TEST(LocalMap, HandlesNegativeCoordinates) {

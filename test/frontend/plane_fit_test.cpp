@@ -17,7 +17,7 @@ NeighbourMoments grid(const Eigen::Quaterniond& q, double half, const Eigen::Vec
   for (int i = -2; i <= 2; ++i) {
     for (int j = -2; j <= 2; ++j) {
       const double sign = (i + j) % 2 == 0 ? 1.0 : -1.0;
-      moments.add(q * (Eigen::Vector3d(0.5 * half * i, 0.5 * half * aspect * j, bump * sign) + shift));
+      moments.add({.offset = q * (Eigen::Vector3d(0.5 * half * i, 0.5 * half * aspect * j, bump * sign) + shift)});
     }
   }
   return moments;
@@ -48,7 +48,7 @@ TEST(PlaneFit, SigmaOfTheNormalMatchesSampledErrors) {
   for (int trial = 0; trial < kTrials; ++trial) {
     NeighbourMoments moments;
     for (int i = -2; i <= 2; ++i) {
-      for (int j = -2; j <= 2; ++j) moments.add({0.2 * i, 0.1 * j, noise(random)});
+      for (int j = -2; j <= 2; ++j) moments.add({.offset = {0.2 * i, 0.1 * j, noise(random)}});
     }
     const PlaneFit fit = fit_plane(moments, config);
     ASSERT_EQ(fit.verdict, PlaneVerdict::kPlane);
@@ -62,13 +62,13 @@ TEST(PlaneFit, SigmaOfTheNormalMatchesSampledErrors) {
 
 TEST(PlaneFit, RefusesTooFewPoints) {
   NeighbourMoments moments;
-  for (int i = 0; i < 4; ++i) moments.add({0.1 * (i % 2), 0.1 * (i / 2), 0.0});
+  for (int i = 0; i < 4; ++i) moments.add({.offset = {0.1 * (i % 2), 0.1 * (i / 2), 0.0}});
   EXPECT_EQ(fit_plane(moments, {}).verdict, PlaneVerdict::kTooFewPoints);
 }
 
 TEST(PlaneFit, RefusesABlob) {
   NeighbourMoments moments;
-  for (int i = 0; i < 27; ++i) moments.add(0.1 * Eigen::Vector3d(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+  for (int i = 0; i < 27; ++i) moments.add({.offset = 0.1 * Eigen::Vector3d(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)});
   EXPECT_EQ(fit_plane(moments, {}).verdict, PlaneVerdict::kBlob);
 }
 

@@ -32,7 +32,7 @@ PlaneFit patch(const Eigen::Matrix3d& axes, int count, double noise, std::mt1993
   for (int i = 0; i < count; ++i) {
     const double u = within(random);
     const double v = within(random);
-    moments.add(axes * Eigen::Vector3d(u, v, across(random)));
+    moments.add({.offset = axes * Eigen::Vector3d(u, v, across(random))});
   }
   return fit_plane(moments, open_gates());
 }
@@ -83,8 +83,8 @@ TEST(SalientPoints, AThickFitOverAnEdgeIsNot) {
   NeighbourMoments edge;  // wall and ceiling, that meet in a line along the axis
   for (int i = 0; i < 5; ++i) {
     for (int j = -1; j <= 1; ++j) {
-      edge.add({0.03 * i, 0.0, 0.03 * j});
-      edge.add({0.0, 0.03 * i, 0.03 * j});
+      edge.add({.offset = {0.03 * i, 0.0, 0.03 * j}});
+      edge.add({.offset = {0.0, 0.03 * i, 0.03 * j}});
     }
   }
   const PlaneFit plane = fit_plane(edge, open_gates());
