@@ -102,6 +102,7 @@ void drive(benchmark::State& state) {
     state.counters["loop_max_ms"] = quantile(loops, 1.0);
     state.counters["loops"] = smoother.stats().loops_kept;
     state.counters["journal_kB/keyframe"] = static_cast<double>(loaded->bytes().size()) / 1e3 / count;
+    std::filesystem::remove_all(folder);
   }
 }
 

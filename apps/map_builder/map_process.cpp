@@ -10,6 +10,7 @@
 #include "ignis/graph_command_t.hpp"
 #include "ignis/keyframe_request_t.hpp"
 #include "map_builder/loop_clouds.h"
+#include "map_builder/part_queue.h"
 #include "runtime/channels.h"
 #include "runtime/stop_signal.h"
 
@@ -29,11 +30,6 @@ constexpr double kPathBytesPerSecond = 15'000.0;
 constexpr double kPathPointBytes = 12.0;
 constexpr std::chrono::milliseconds kMinPathPeriod{300};
 constexpr int kHealthQueue = 100;
-
-// What waits for this process is held by LCM, whose buffer grows by half whenever it is full and never shrinks. A part
-// is up to 60 kB, so these are at most 18 MB each. What finds no place is not lost for good: a missing keyframe is
-// asked for again, and the corrections come in full every two seconds.
-constexpr int kMaxWaitingParts = 300;
 
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -72,14 +68,14 @@ MapProcess::MapProcess(const runtime::Application& application, const runtime::H
 
 void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
   const auto remember = [this](const runtime::ReceiverCounts& counts) { receivers_.push_back(&counts); };
-  const int part_queue = std::min(lcm.keyframe_queue, kMaxWaitingParts);
+  const int parts = part_queue(lcm.keyframe_queue);
   remember(link_.subscribe<cloud_t>(channels::kCloud, lcm.cloud_queue, [this](const cloud_t& message) {
     if (const auto cloud = clouds_.add(message)) on_cloud(*cloud);
   }));
-  remember(link_.subscribe<keyframe_t>(channels::kKeyframe, part_queue, [this](const keyframe_t& message) {
+  remember(link_.subscribe<keyframe_t>(channels::kKeyframe, parts, [this](const keyframe_t& message) {
     if (const auto keyframe = keyframes_.add(message)) on_keyframe(*keyframe);
   }));
-  remember(link_.subscribe<smoothed_keyframes_t>(channels::kSmoothedKeyframes, part_queue,
+  remember(link_.subscribe<smoothed_keyframes_t>(channels::kSmoothedKeyframes, parts,
                                                  [this](const smoothed_keyframes_t& message) {
                                                    if (const auto revision = revisions_.add(message)) {
                                                      on_revision(*revision);

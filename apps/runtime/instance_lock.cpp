@@ -7,6 +7,7 @@
 #include <cstring>
 #include <format>
 #include <optional>
+#include <string_view>
 
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -18,10 +19,12 @@
 namespace ignis::runtime {
 
 InstanceLock::InstanceLock(const std::string& process, const std::string& url) {
-  const std::optional<BusAddress> address_of_bus = BusAddress::parse(url);
-  if (!address_of_bus) return;
-  // The same bus has many spellings, and options behind the address do not make another one.
-  const std::string bus = std::format("{}:{}", address_of_bus->group, address_of_bus->port);
+  constexpr std::string_view kScheme = "udpm://";
+  if (!url.starts_with(kScheme)) return;
+  // The same bus has many spellings, and options behind the address do not make another one. LCM may make something of
+  // a spelling that is none of these.
+  const std::optional<BusAddress> known = BusAddress::parse(url);
+  const std::string bus = known ? std::format("{}:{}", known->group, known->port) : url.substr(kScheme.size());
   const std::string name = std::format("ignis-lio/{}/{}", process, bus);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -74,9 +74,12 @@ std::string PeerWatch::trouble(double now_s) const {
   for (const auto& [key, heard] : peers_) {
     if (now_s - heard.last_s <= kForgetAfter_s) add(disagreement(heard));
   }
-  // In the order of names, instances of one executable are neighbours.
+  // In the order of names, instances of one executable stand together; one between two others may just have ended.
   for (auto each = peers_.begin(); each != peers_.end(); ++each) {
-    if (const auto other = std::next(each); other != peers_.end()) add(twins(each->second, other->second, now_s));
+    for (auto other = std::next(each); other != peers_.end(); ++other) {
+      if (other->second.peer.process != each->second.peer.process) break;
+      add(twins(each->second, other->second, now_s));
+    }
   }
   for (const auto& [process, starts] : starts_) {
     if (starts.size() == kCrashLoopStarts && now_s - starts.front().heard_s <= kCrashLoopSeconds) {

@@ -30,7 +30,8 @@ class Recording:
     """What is recorded into one file after another, and what is known about it.
 
     A new file begins when the logger was killed, and when a disk that was nearly full has room again: what was written
-    is left as it is. While the disk is too full HEALTH says FAULT; a logger that was killed is succeeded at once.
+    is left as it is. While the disk is too full HEALTH says FAULT; a logger that was killed is succeeded at
+    once, a successor that ended at once after two seconds.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:

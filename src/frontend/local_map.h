@@ -23,8 +23,8 @@ namespace ignis {
 /// map_average_points: range noise averages out. Each remembers from where it was seen: a thin wall has two sides.
 ///
 /// Voxels live in blocks of 4x4x4, blocks in regions of 4x4x4, with one bit of occupancy each; regions are found by
-/// open addressing. A neighbourhood is one or two regions, bit masks, and the rows of four voxels that these leave, a
-/// cache line each: its cost does not depend on the size of the map, and empty space costs nothing.
+/// open addressing. A neighbourhood is one or two regions, bit masks, and the rows of four voxels that these leave, two
+/// lines of the cache each: its cost does not depend on the size of the map, and empty space costs nothing.
 ///
 /// Points of scans that contradicted the map enter unconfirmed: they hold their voxel, but have no vote in plane fits
 /// until a scan that agreed puts a point of its own there.
@@ -71,7 +71,7 @@ class LocalMap {
     float z[kEdge] = {};
     float weight[kEdge] = {};  ///< points in the mean
     float scan[kEdge] = {};    ///< mean number of the scans that these come from
-    float view_x[kEdge] = {};  ///< mean unit vector from them to the sensor
+    float view_x[kEdge] = {};  ///< mean unit vector from them to the body, for the sensor is near it
     float view_y[kEdge] = {};
     float view_z[kEdge] = {};
   };
@@ -98,7 +98,7 @@ class LocalMap {
   /// Where a point goes.
   struct Place {
     Eigen::Vector3f local;  ///< [m] relative to the block's corner
-    Eigen::Vector3f view;   ///< unit vector to the sensor
+    Eigen::Vector3f view;   ///< unit vector to the body
     std::int32_t block;     ///< index into blocks_
     int bit;                ///< voxel within the block
   };

@@ -118,11 +118,11 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   pooled_variance_ = variance_sum / count;
 }
 
-void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& sensor) {
+void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from) {
   planes_.assign(queries_.size(), {});
   chosen_.clear();
   for (std::size_t i = 0; i < queries_.size(); ++i) chosen_.push_back(i);
-  fit_chosen(map, sensor, config_, config_.match_radius_m);
+  fit_chosen(map, seen_from, config_, config_.match_radius_m);
   // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
   // where it is not.
   const double radius = config_.wide_match_radius_m;
@@ -131,11 +131,11 @@ void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& sensor
   for (std::size_t i = 0; i < planes_.size(); ++i) {
     if (planes_[i].verdict == PlaneVerdict::kTooFewPoints) chosen_.push_back(i);
   }
-  fit_chosen(map, sensor, wide_config_, radius);
+  fit_chosen(map, seen_from, wide_config_, radius);
 }
 
 /// Planes of the chosen queries. Where one was seen from its other side, it is that of the points seen from this side.
-void ScanMatcher::fit_chosen(const LocalMap& map, const Eigen::Vector3d& sensor, const FrontendConfig& config,
+void ScanMatcher::fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config,
                              double radius) {
   const auto fit = [&](std::span<const Eigen::Vector3d> sides) {
     chosen_queries_.clear();
@@ -146,7 +146,7 @@ void ScanMatcher::fit_chosen(const LocalMap& map, const Eigen::Vector3d& sensor,
   fit({});
   sides_.clear();
   std::erase_if(chosen_, [&](std::size_t i) {
-    const Eigen::Vector3d view = (sensor - queries_[i]).normalized();
+    const Eigen::Vector3d view = (seen_from - queries_[i]).normalized();
     const bool other = is_seen_from_other_side(planes_[i], view);
     if (other) sides_.push_back(planes_[i].normal.dot(view) > 0.0 ? planes_[i].normal : -planes_[i].normal);
     return !other;

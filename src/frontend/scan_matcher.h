@@ -71,8 +71,8 @@ class ScanMatcher {
 
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
   /// Replaces planes_ by those nearest to queries_.
-  void find_planes(const LocalMap& map, const Eigen::Vector3d& sensor);
-  void fit_chosen(const LocalMap& map, const Eigen::Vector3d& sensor, const FrontendConfig& config, double radius);
+  void find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from);
+  void fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config, double radius);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);

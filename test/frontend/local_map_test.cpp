@@ -45,6 +45,42 @@ TEST(LocalMap, GathersExactlyWhatABruteForceSearchFinds) {
   }
 }
 
+TEST(LocalMap, GathersWeightsSidesAndScansAsABruteForceSumDoes) {
+  FrontendConfig config;
+  config.map_average_points = 60000;
+  LocalMap map(config);
+  for (const int times : {1, 3, 2}) {
+    for (int i = 0; i < times; ++i) {
+      map.insert(random_points(static_cast<std::uint32_t>(times), 4000, 3.0F),
+                 {so3::exp({0.1, 0.2, 0.3}), {0.5 * times, 0.0, -1.0}}, true);
+    }
+  }
+  // One voxel at a time, by a radius that reaches no other: these are the neighbours.
+  std::vector<std::pair<Eigen::Vector3d, NeighbourMoments>> voxels;
+  for (const Eigen::Vector3d& point : map.points()) {
+    voxels.emplace_back(point, map.gather(point, 1e-4));
+    ASSERT_EQ(voxels.back().second.count, 1);
+  }
+  const Eigen::Vector3d side = Eigen::Vector3d(1.0, -0.5, 0.3).normalized();
+  for (const Eigen::Vector3f& at : random_points(2, 100, 3.0F)) {
+    const Eigen::Vector3d query = at.cast<double>();
+    NeighbourMoments expected;
+    for (const auto& [point, voxel] : voxels) {
+      const Eigen::Vector3d view = voxel.view_sum / voxel.weight;
+      if ((point - query).norm() > 0.5 || view.dot(side) < 0.0) continue;
+      expected.add(
+          {.offset = point - query, .weight = voxel.weight, .scan = voxel.scan_sum / voxel.weight, .view = view});
+    }
+    const NeighbourMoments found = map.gather(query, 0.5, side);
+    ASSERT_EQ(found.count, expected.count);
+    EXPECT_EQ(found.weight, expected.weight);
+    EXPECT_NEAR(found.scan_sum, expected.scan_sum, 1e-4 * expected.weight);
+    EXPECT_LE((found.view_sum - expected.view_sum).norm(), 1e-5 * expected.weight);
+    EXPECT_LE((found.sum - expected.sum).norm(), 1e-5 * expected.weight);
+    EXPECT_LE((found.sum_outer - expected.sum_outer).norm(), 1e-5 * expected.weight);
+  }
+}
+
 TEST(NeighbourSearch, GathersForManyQueriesToTheBitWhatTheMapGathersForEach) {
   const FrontendConfig config;
   LocalMap map(config);

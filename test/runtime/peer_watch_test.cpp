@@ -89,6 +89,16 @@ TEST(Fault_B7, TwoInstancesOfAnotherProcessAreNamedOnceBothHaveGoneOn) {
   EXPECT_EQ(watch.trouble(5.6), "");
 }
 
+TEST(Fault_B7, AThirdThatHasJustEndedDoesNotHideTheOtherTwo) {
+  PeerWatch watch(kSelf);
+  for (int i = 0; i < 4; ++i) {
+    watch.observe(peer("l1_driver", 100), i);
+    watch.observe(peer("l1_driver", 200), i + 0.1);
+  }
+  watch.observe(peer("l1_driver", 150), 3.2);
+  EXPECT_EQ(watch.trouble(3.3), "two instances of l1_driver are on the bus (processes 100 and 200)");
+}
+
 TEST(Fault_B7, OneThatIsStartedAnewAndToolsAreNoTwoInstances) {
   PeerWatch watch(kSelf);
   PeerIdentity tool = peer("ignis_record", 1);
