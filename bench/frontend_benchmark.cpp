@@ -117,9 +117,9 @@ void slide_map(benchmark::State& state, const std::string& sensor) {
   for (auto _ : state) {
     state.PauseTiming();
     LocalMap map = full;
-    map.slide(drive.states.back().T_odom_body.translation);
+    map.slide(drive.states.back().T_odom_body.translation, 0);
     state.ResumeTiming();
-    map.slide(ahead);
+    map.slide(ahead, 0);
     benchmark::DoNotOptimize(map.size());
   }
   state.SetItemsProcessed(state.iterations() * full.size());

@@ -19,7 +19,8 @@ struct LcmConfig {
     visit.text("url", self.url, "LCM URL of the bus; ttl=0 never leaves the host, and recv_buf_size must be given");
     visit.integer("imu_queue", self.imu_queue, {100, 100000}, "messages", "queue of L1_IMU; 5000 are 20 s");
     visit.integer("scan_queue", self.scan_queue, {1, 100000}, "messages", "queue of L1_SCAN, in parts");
-    visit.integer("keyframe_queue", self.keyframe_queue, {10, 100000}, "messages", "queue of the keyframe channels");
+    visit.integer("keyframe_queue", self.keyframe_queue, {10, 100000}, "messages",
+                  "queue of the keyframe channels; map_builder 300 at most");
     visit.integer("cloud_queue", self.cloud_queue, {1, 10000}, "messages", "queue of LIO_CLOUD, in parts");
     visit.integer("state_queue", self.state_queue, {1, 10000}, "messages", "queue of states that are only shown");
   }

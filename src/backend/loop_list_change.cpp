@@ -2,6 +2,7 @@
 #include "backend/loop_list_change.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace ignis {

@@ -13,7 +13,7 @@ namespace ignis {
 namespace {
 
 /// A candidate's surroundings.
-struct LocalMap {
+struct Surroundings {
   std::vector<std::vector<CloudPoint>> points;
   std::vector<Pose> T_candidate_body;  ///< of each of them
   std::string problem;                 ///< why there is none; empty when all is well
@@ -26,26 +26,26 @@ struct LocalMap {
 };
 
 /// Clouds of the candidate and its neighbours in the candidate's frame. Never reaches the keyframe that looks.
-LocalMap local_map(std::size_t candidate, std::size_t neighbours, SmootherState& state) {
+Surroundings surroundings_of(std::size_t candidate, std::size_t neighbours, SmootherState& state) {
   const std::size_t first = candidate > neighbours ? candidate - neighbours : 0;
   const std::size_t last = std::min(candidate + neighbours, state.poses.size() - 2);
   const Pose T_candidate_map = state.poses[candidate].T_map_body.inverse();
-  LocalMap map;
+  Surroundings around;
   for (std::size_t i = first; i <= last; ++i) {
     CloudLookup cloud = state.clouds.find(i);
     if (!cloud.problem.empty()) return {{}, {}, std::move(cloud.problem)};
-    map.points.push_back(std::move(cloud.points));
-    map.T_candidate_body.push_back(T_candidate_map * state.poses[i].T_map_body);
+    around.points.push_back(std::move(cloud.points));
+    around.T_candidate_body.push_back(T_candidate_map * state.poses[i].T_map_body);
   }
-  return map;
+  return around;
 }
 
-LoopMatch match_in(const LocalMap& map, LoopSource& source, const Pose& T_candidate_current,
+LoopMatch match_in(const Surroundings& around, LoopSource& source, const Pose& T_candidate_current,
                    const BackendConfig& config, const LoopGates& gates) {
-  if (map.problem.empty()) return match_loop(source, map.clouds(), T_candidate_current, config.matcher, gates);
+  if (around.problem.empty()) return match_loop(source, around.clouds(), T_candidate_current, config.matcher, gates);
   LoopMatch lost;
   lost.reason = LoopReason::kCloudLost;
-  lost.reason_text = map.problem;
+  lost.reason_text = around.problem;
   return lost;
 }
 
@@ -103,12 +103,13 @@ LoopProposal best_match(const std::vector<std::size_t>& chosen, SmootherState& s
   LoopProposal proposal;
   const KeyframePose& current = state.poses.back();
   const auto neighbours = static_cast<std::size_t>(config.matcher.neighbours);
+  // Never lost: the newest cloud leaves memory only when the next one comes.
   const CloudLookup looking = state.clouds.find(state.poses.size() - 1);
   LoopSource source(looking.points, config.matcher);
   LoopMatch best;
   for (const std::size_t i : chosen) {
     const Pose T_candidate_current = state.poses[i].T_map_body.inverse() * current.T_map_body;
-    const LoopMatch match = match_in(local_map(i, neighbours, state), source, T_candidate_current, config, gates);
+    const LoopMatch match = match_in(surroundings_of(i, neighbours, state), source, T_candidate_current, config, gates);
     if (match.verified()) ++proposal.result.passed;
     if (i != chosen.front() && !is_better(match, best)) continue;
     best = match;

@@ -16,7 +16,6 @@
 #include "common/config_check.h"
 
 namespace ignis {
-
 namespace {
 
 CloudStore empty_store(const BackendConfig& config, const RecordArchive* archive) {
@@ -61,7 +60,7 @@ struct Smoother::Impl {
   IncrementalSolver solver;
   SmootherState state;
   ChangeTracker tracker;
-  std::size_t changes = 0;  ///< taken so far
+  std::size_t changes = 0;  ///< taken so far: the number of the next one's record
 };
 
 Smoother::Smoother(const BackendConfig& config, const LoopGates& gates, const RecordArchive* archive) {
@@ -75,7 +74,9 @@ Smoother::Smoother(Smoother&&) noexcept = default;
 Smoother& Smoother::operator=(Smoother&&) noexcept = default;
 
 SmootherUpdate Smoother::add_keyframe(const Keyframe& keyframe) {
-  auto& [config, gates, solver, state, tracker, changes] = *impl_;
+  const BackendConfig& config = impl_->config;
+  IncrementalSolver& solver = impl_->solver;
+  SmootherState& state = impl_->state;
   SmootherUpdate update;
   update.verdict = verdict_on(keyframe, state, update.reason);
   if (update.accepted()) {
@@ -98,7 +99,9 @@ SmootherUpdate Smoother::add_keyframe(const Keyframe& keyframe) {
 }
 
 SmootherUpdate Smoother::add_loop(const LoopMeasurement& measurement) {
-  auto& [config, gates, solver, state, tracker, changes] = *impl_;
+  const BackendConfig& config = impl_->config;
+  IncrementalSolver& solver = impl_->solver;
+  SmootherState& state = impl_->state;
   SmootherUpdate update;
   LoopResult result;
   result.from_id = measurement.from_id;
@@ -133,7 +136,8 @@ bool Smoother::is_of_another_drive(const Keyframe& keyframe) const {
 }
 
 SmootherUpdate Smoother::withdraw_loop(std::int32_t from_id, std::int32_t to_id) {
-  auto& [config, gates, solver, state, tracker, changes] = *impl_;
+  IncrementalSolver& solver = impl_->solver;
+  SmootherState& state = impl_->state;
   SmootherUpdate update;
   update.verdict = KeyframeVerdict::kAccepted;
   for (GraphLoop& event : dismiss_loops(from_id, to_id, solver, state))
@@ -151,7 +155,9 @@ SmootherUpdate Smoother::veto_loop(std::int32_t from_id, std::int32_t to_id) {
 ShadowProblem Smoother::shadow_problem() { return ignis::shadow_problem(impl_->solver, impl_->state); }
 
 SmootherUpdate Smoother::adopt(const ShadowOptimum& optimum) {
-  auto& [config, gates, solver, state, tracker, changes] = *impl_;
+  const BackendConfig& config = impl_->config;
+  IncrementalSolver& solver = impl_->solver;
+  SmootherState& state = impl_->state;
   SmootherUpdate update;
   update.verdict = KeyframeVerdict::kAccepted;
   if (take_over(optimum, config, solver, state)) ++state.revision;

@@ -131,7 +131,8 @@ class Smoother {
   /// Poses, odometry and loops for keyframes.g2o.
   [[nodiscard]] PoseGraph pose_graph() const;
 
-  /// What changed since the previous call, as the next record for the archive.
+  /// What changed since the previous call, as the next record for the archive. From here on the archive is taken to
+  /// have it, so the clouds in it may leave memory.
   [[nodiscard]] std::vector<std::byte> take_change();
 
  private:

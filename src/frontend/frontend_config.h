@@ -70,6 +70,8 @@ struct FrontendConfig {
   double lost_sigma_m = 1.0;
   int min_scan_points = 50;
   int min_matches = 20;
+  double map_memory_m = 20.0;
+  double map_memory_sigma_m = 0.05;
   int max_scan_points = 3000;
   int reanchor_scans = 20;
   double keyframe_max_seconds = 5.0;
@@ -210,6 +212,11 @@ struct FrontendConfig {
                  "largest position sigma of a pose that is still of use");
     visit.integer("min_scan_points", self.min_scan_points, {1, 100000}, "points", "fewer: the scan is skipped");
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
+    visit.number(
+        "map_memory_m", self.map_memory_m, {1.0, 500.0}, "m",
+        "the local map reaches so far where it is as surely placed as the vehicle; map_window_m if that is more");
+    visit.number("map_memory_sigma_m", self.map_memory_sigma_m, {1e-3, 10.0}, "m",
+                 "growth of the position's sigma since then, up to which a part of the map counts as surely placed");
     visit.integer("max_scan_points", self.max_scan_points, {100, 200000}, "points",
                   "larger scans are thinned, and matched with at most so many");
     visit.integer("reanchor_scans", self.reanchor_scans, {1, 10000}, "scans",
@@ -218,7 +225,8 @@ struct FrontendConfig {
     visit.number("keyframe_cloud_seconds", self.keyframe_cloud_seconds, {0.01, 5.0}, "s",
                  "scans of this time make a keyframe's cloud");
     visit.number("max_scan_delay_s", self.max_scan_delay_s, {0.05, 10.0}, "s", "IMU history kept for late scans");
-    visit.number("stationary_speed", self.stationary_speed, {1e-3, 1.0}, "m/s", "slower counts as standing");
+    visit.number("stationary_speed", self.stationary_speed, {1e-3, 1.0}, "m/s",
+                 "slower counts as standing; up to four times that while the velocity is uncertain");
     visit.number("zero_velocity_sigma", self.zero_velocity_sigma, {0.0, 1.0}, "m/s",
                  "what standing says about the velocity, per scan; 0: standing is not used");
     visit.number("scan_voxel_m", self.scan_voxel_m, {0.0, 5.0}, "m",

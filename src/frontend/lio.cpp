@@ -246,7 +246,7 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   published.covariance.topLeftCorner<6, 6>() += drift_.pose_covariance(filter_.nominal.T_odom_body);
   auto position_covariance = published.covariance.block<3, 3>(kPosition, kPosition);
   position_covariance += tilt_of_blind_shifts(match.degeneracy, position_covariance);
-  drift_.remember(map_.scans(), position_covariance);
+  drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation);
   result.covariance = published.covariance.topLeftCorner<15, 15>();
   if (velocity_known_) {
     result.keyframe =
@@ -271,9 +271,7 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
     every_nth(is_large ? sparse : cloud, config_.max_scan_points, match_points_);
     const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
     const Pose T_start = is_lost ? reacquire(filter_, match_points_, map_, config_) : filter_.nominal.T_odom_body;
-    const Matrix6d pose_covariance =
-        cautious_.topLeftCorner<6, 6>() + drift_.pose_covariance(filter_.nominal.T_odom_body);
-    const int salient_since = drift_.sure_since(pose_covariance.bottomRightCorner<3, 3>(), config_.match_radius_m);
+    const int salient_since = sure_since(config_.match_radius_m);
     const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
     result = matcher_.match(seen, T_start, match_points_, map_, salient_since);
     const Eigen::Vector3d gained = result.filter.nominal.v_odom - filter_.nominal.v_odom;
@@ -281,6 +279,13 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
     result.filter.covariance = with_position_at(result.filter.covariance, age);
   }
   return result;
+}
+
+/// The first scan of the map since which the position has become less certain by no more than `sigma_m`.
+int Lio::sure_since(double sigma_m) const {
+  const Pose& T_odom_body = filter_.nominal.T_odom_body;
+  const Matrix6d pose_covariance = cautious_.topLeftCorner<6, 6>() + drift_.pose_covariance(T_odom_body);
+  return drift_.sure_since(pose_covariance.bottomRightCorner<3, 3>(), T_odom_body.translation, sigma_m);
 }
 
 void Lio::count_correction(const MatchResult& match, double age) {
@@ -337,7 +342,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& matc
     mapped_velocity_variance_ += share * (velocity_variance(filter_.covariance) - mapped_velocity_variance_);
   }
   map_.insert(cloud, filter_.nominal.T_odom_body, confirmed);
-  map_.slide(filter_.nominal.T_odom_body.translation);
+  map_.slide(filter_.nominal.T_odom_body.translation, sure_since(config_.map_memory_sigma_m));
 }
 
 /// Whatever the old map was, this is another place or the pose was wrong: a new session begins here. Attitude to

@@ -93,6 +93,7 @@ class Lio {
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
                                     double age);
+  [[nodiscard]] int sure_since(double sigma_m) const;
   void count_correction(const MatchResult& match, double age);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);

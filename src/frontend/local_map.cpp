@@ -18,6 +18,8 @@ using cubes::voxel_of;
 
 constexpr std::int32_t kFree = -1;
 constexpr std::size_t kFirstCapacity = 256;
+constexpr std::size_t kSlidesToSweep = 16;  // so that no scan has to wait for the whole map to be looked through
+
 }  // namespace
 
 LocalMap::LocalMap(const FrontendConfig& config)
@@ -25,6 +27,7 @@ LocalMap::LocalMap(const FrontendConfig& config)
       match_radius_(config.match_radius_m),
       window_(config.map_window_m),
       window_y_(config.map_window_y),
+      memory_(std::max(config.map_memory_m, config.map_window_m)),
       average_points_(static_cast<float>(config.map_average_points)) {
   config::require_valid(config, "frontend");
   clear();
@@ -63,6 +66,7 @@ void LocalMap::clear() {
   scans_ = 0;
   inserted_points_ = 0;
   has_slid_ = false;
+  unswept_ = 0;
 }
 
 LocalMap::Region& LocalMap::find_or_add_region(const Eigen::Vector3i& coordinate) {
@@ -98,16 +102,14 @@ void LocalMap::rebuild_table(std::size_t capacity) {
   }
 }
 
-/// The regions of blocks that have changed their places.
+/// The regions of all blocks, anew.
 void LocalMap::rebuild_regions() {
   regions_.clear();
   table_.assign(kFirstCapacity, kFree);
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const Eigen::Vector3i parent = cube_of(blocks_[i].coordinate);
-    const int bit = bit_of(blocks_[i].coordinate - kEdge * parent);
-    Region& region = find_or_add_region(parent);
-    region.present |= std::uint64_t{1} << bit;
-    region.blocks[bit] = static_cast<std::int32_t>(i);
+    const auto [region, bit] = home_of(blocks_[i]);
+    region->present |= std::uint64_t{1} << bit;
+    region->blocks[bit] = static_cast<std::int32_t>(i);
   }
 }
 
@@ -214,28 +216,74 @@ std::optional<Eigen::Vector3d> LocalMap::nearest(const Eigen::Vector3d& query, d
   return query + best->cast<double>();
 }
 
-void LocalMap::slide(const Eigen::Vector3d& position) {
-  if (has_slid_ && (position - last_slide_).norm() < 0.25 * window_) return;
+void LocalMap::slide(const Eigen::Vector3d& position, int sure_since) {
   if (!has_slid_) {
     has_slid_ = true;
     last_slide_ = position;
-    return;
   }
-  last_slide_ = position;
-  const Eigen::Vector3d window(window_, window_y_, window_);
-  for (Block& block : blocks_) {
-    const Eigen::Vector3d corner = kEdge * voxel_size_ * block.coordinate.cast<double>();
-    for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
-      const int bit = std::countr_zero(left);
-      const Eigen::Vector3d point = corner + block.point(bit).cast<double>();
-      if (((point - position).cwiseAbs().array() <= window.array()).all()) continue;
-      block.occupied &= ~(std::uint64_t{1} << bit);
-      block.confirmed &= ~(std::uint64_t{1} << bit);
-      --size_;
-    }
+  if ((position - last_slide_).norm() >= 0.25 * window_) {
+    sweep(unswept_);
+    last_slide_ = position;
+    sure_since_ = sure_since;
+    unswept_ = blocks_.size();
+    sweep_step_ = unswept_ / kSlidesToSweep + 1;
   }
-  std::erase_if(blocks_, [](const Block& block) { return block.occupied == 0; });
-  rebuild_regions();
+  sweep(sweep_step_);
+}
+
+/// Looks at the next blocks, from the last to the first, so that what takes the place of a dropped one has been looked
+/// at.
+void LocalMap::sweep(std::uint64_t blocks) {
+  if (unswept_ == 0) return;
+  const std::uint64_t until = unswept_ - std::min(unswept_, blocks);
+  for (; unswept_ > until; --unswept_) {
+    prune(blocks_[unswept_ - 1]);
+    if (blocks_[unswept_ - 1].occupied == 0) drop_block(unswept_ - 1);
+  }
+  if (unswept_ == 0) drop_empty_regions();
+}
+
+/// Takes out the voxels that have left the window.
+void LocalMap::prune(Block& block) {
+  const double edge = kEdge * voxel_size_;
+  const Eigen::Vector3d corner = edge * block.coordinate.cast<double>();
+  const Eigen::Array3d window(window_, window_y_, window_);
+  const Eigen::Array3d memory(memory_, window_y_, memory_);
+  const Eigen::Array3d near = (corner - last_slide_).array();
+  const Eigen::Array3d farthest = near.abs().max((near + edge).abs());
+  if ((farthest <= window).all()) return;  // none of its voxels has to be read
+  for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
+    const int bit = std::countr_zero(left);
+    const Voxel voxel = block.voxel(bit);
+    const Eigen::Array3d offset = (corner + voxel.point.cast<double>() - last_slide_).cwiseAbs().array();
+    const bool sure = voxel.scan >= static_cast<float>(sure_since_);
+    if ((offset <= (sure ? memory : window)).all()) continue;
+    block.occupied &= ~(std::uint64_t{1} << bit);
+    block.confirmed &= ~(std::uint64_t{1} << bit);
+    --size_;
+  }
+}
+
+/// The last block takes its place.
+void LocalMap::drop_block(std::size_t index) {
+  const auto [region, bit] = home_of(blocks_[index]);
+  region->present &= ~(std::uint64_t{1} << bit);
+  if (index + 1 != blocks_.size()) {
+    blocks_[index] = blocks_.back();
+    const auto [moved_region, moved_bit] = home_of(blocks_[index]);
+    moved_region->blocks[moved_bit] = static_cast<std::int32_t>(index);
+  }
+  blocks_.pop_back();
+}
+
+LocalMap::Home LocalMap::home_of(const Block& block) {
+  const Eigen::Vector3i parent = cube_of(block.coordinate);
+  return {&find_or_add_region(parent), bit_of(block.coordinate - kEdge * parent)};
+}
+
+void LocalMap::drop_empty_regions() {
+  std::erase_if(regions_, [](const Region& region) { return region.present == 0; });
+  rebuild_table(table_.size());
 }
 
 std::vector<Eigen::Vector3d> LocalMap::points() const {

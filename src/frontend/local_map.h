@@ -46,8 +46,11 @@ class LocalMap {
   /// The confirmed point nearest a point, within a radius [m]. Costs what gather costs: for rare use.
   [[nodiscard]] std::optional<Eigen::Vector3d> nearest(const Eigen::Vector3d& query, double radius) const;
 
-  /// Drops what left the window, once the vehicle has moved a quarter of the window since the last time.
-  void slide(const Eigen::Vector3d& position);
+  /// Once the vehicle has moved a quarter of the window since the last time, drops what left it, in the course of this
+  /// and the next calls: call it after each scan. What lies farther than map_window_m and is of scans before number
+  /// `sure_since` goes as well: it is no longer where the map says, and a vehicle that comes back would be matched with
+  /// both.
+  void slide(const Eigen::Vector3d& position, int sure_since);
 
   void clear();
 
@@ -109,6 +112,12 @@ class LocalMap {
     std::int32_t blocks[kCells] = {};                      ///< index into blocks_
   };
 
+  /// Where a block is found: bit `bit` of `region`.
+  struct Home {
+    Region* region;
+    int bit;
+  };
+
   /// Voxels from corner to corner, both included.
   struct Box {
     Eigen::Vector3i lo;
@@ -127,7 +136,12 @@ class LocalMap {
   [[nodiscard]] std::int32_t find_or_add_block(const Eigen::Vector3i& coordinate);  ///< index into blocks_
   void insert_all(auto points, const Pose& T_odom_body, bool confirmed, auto position_of);
   void insert_point(const Place& place, bool confirmed);
+  void sweep(std::uint64_t blocks);
+  void prune(Block& block);
+  void drop_block(std::size_t index);
+  void drop_empty_regions();
   [[nodiscard]] bool nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vector3f& stored, int bit) const;
+  [[nodiscard]] Home home_of(const Block& block);
   void rebuild_regions();
   void rebuild_table(std::size_t capacity);
   [[nodiscard]] std::size_t slot_of(const Eigen::Vector3i& coordinate) const;
@@ -138,6 +152,7 @@ class LocalMap {
   double match_radius_;
   double window_;
   double window_y_;
+  double memory_;
   float average_points_;
   std::vector<Block> blocks_;
   std::vector<Region> regions_;
@@ -146,7 +161,10 @@ class LocalMap {
   int scans_ = 0;
   std::int64_t inserted_points_ = 0;
   bool has_slid_ = false;
-  Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_slide_ = Eigen::Vector3d::Zero();  ///< where the window was put last
+  int sure_since_ = 0;                                    ///< what is of earlier scans has no place beyond the window
+  std::uint64_t unswept_ = 0;                             ///< the first blocks, not looked at since
+  std::uint64_t sweep_step_ = 0;                          ///< so many of them are looked at per scan
 
   /// Taken voxels alone, each in one go: there are many.
   friend void transfer(auto& io, FieldsOf<Block> auto& block) {
@@ -172,6 +190,9 @@ class LocalMap {
     io.number(map.inserted_points_);
     io.number(map.has_slid_);
     io.matrix(map.last_slide_);
+    io.number(map.sure_since_);
+    io.number(map.unswept_);
+    io.number(map.sweep_step_);
     if constexpr (requires { map.rebuild_regions(); }) map.rebuild_regions();
   }
 };

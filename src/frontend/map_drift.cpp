@@ -2,6 +2,7 @@
 #include "frontend/map_drift.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "common/so3.h"
 
@@ -9,7 +10,7 @@ namespace ignis {
 namespace {
 
 constexpr int kScansBetweenPlacements = 10;  // half a second
-constexpr std::size_t kMostPlacements = 400;
+constexpr std::size_t kMostPlacements = 256;
 
 /// Takes an error of (attitude in body axes, position in odom axes) to one with both in odom axes.
 Matrix6d attitude_to_odom(const Pose& T_odom_body) {
@@ -26,9 +27,10 @@ void MapDrift::begin(const FilterState& first) {
   turn_by_tilt(0, 1) = 1.0;
   turn_by_tilt(2, 0) = -1.0;
   covariance_.setZero();
-  covariance_.topLeftCorner<3, 3>() =
-      turn_by_tilt * first.covariance.block<2, 2>(kGravityTilt, kGravityTilt) * turn_by_tilt.transpose();
-  position_ = first.nominal.T_odom_body.translation;
+  start_tilt_ = turn_by_tilt * first.covariance.block<2, 2>(kGravityTilt, kGravityTilt) * turn_by_tilt.transpose();
+  covariance_.topLeftCorner<3, 3>() = start_tilt_;
+  start_ = first.nominal.T_odom_body.translation;
+  position_ = start_;
 }
 
 void MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans) {
@@ -38,16 +40,33 @@ void MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body
   position_ = T_odom_body.translation;
 }
 
-void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance) {
+void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position) {
   if (!placements_.empty() && scan < placements_.back().scan) placements_.clear();
   if (!placements_.empty() && scan < placements_.back().scan + kScansBetweenPlacements) return;
-  placements_.push_back({scan, position_covariance});
-  if (placements_.size() > kMostPlacements) placements_.pop_front();
+  placements_.push_back({scan, position_covariance, position_covariance - shift_by_tilt(position)});
+  if (placements_.size() > kMostPlacements) forget_one();
 }
 
-int MapDrift::sure_since(const Eigen::Matrix3d& position_covariance, double sigma_m) const {
+/// The one that leaves the smallest gap for its age, so that the older they are the fewer are left.
+void MapDrift::forget_one() {
+  const int newest = placements_.back().scan;
+  std::size_t least = 1;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i + 1 < placements_.size(); ++i) {
+    const double gap = placements_[i + 1].scan - placements_[i - 1].scan;
+    const double share = gap / (newest - placements_[i].scan);
+    if (share >= smallest) continue;
+    smallest = share;
+    least = i;
+  }
+  placements_.erase(placements_.begin() + static_cast<std::ptrdiff_t>(least));
+}
+
+int MapDrift::sure_since(const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
+                         double sigma_m) const {
+  const Eigen::Matrix3d in_map = position_covariance - shift_by_tilt(position);
   const auto doubtful = [&](const Placement& then) {
-    return (position_covariance - then.position_covariance).diagonal().maxCoeff() > sigma_m * sigma_m;
+    return (in_map - then.in_map).diagonal().maxCoeff() > sigma_m * sigma_m;
   };
   const auto last_doubtful = std::ranges::find_if(placements_.rbegin(), placements_.rend(), doubtful);
   return last_doubtful == placements_.rend() ? 0 : last_doubtful->scan + 1;
@@ -77,6 +96,11 @@ Matrix6d MapDrift::at(const Eigen::Vector3d& position) const {
   Matrix6d carry = Matrix6d::Identity();
   carry.bottomLeftCorner<3, 3>() = -so3::skew(position - position_);
   return carry * covariance_ * carry.transpose();
+}
+
+Eigen::Matrix3d MapDrift::shift_by_tilt(const Eigen::Vector3d& position) const {
+  const Eigen::Matrix3d lever = so3::skew(position - start_);
+  return lever * start_tilt_ * lever.transpose();
 }
 
 }  // namespace ignis

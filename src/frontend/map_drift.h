@@ -36,13 +36,15 @@ class MapDrift {
   /// made of points of the age `age_scans` on average.
   void add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans);
 
-  /// Remembers how well the position was known [m^2, odom axes, published covariance] when the map's scan number
-  /// `scan` was placed. Numbers ascend; a smaller one begins a new map.
-  void remember(int scan, const Eigen::Matrix3d& position_covariance);
+  /// Remembers how well a position was known [m^2, odom axes, published covariance] when the map's scan number
+  /// `scan` was placed there. Numbers ascend; a smaller one begins a new map. Of what is old only some are kept.
+  void remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position);
 
   /// The first scan whose planes are sure to be the ones that are met now: since then the position, of which
-  /// `position_covariance` is published now, has become less certain by no more than `sigma_m` along any axis.
-  [[nodiscard]] int sure_since(const Eigen::Matrix3d& position_covariance, double sigma_m) const;
+  /// `position_covariance` is published now, has become less certain by no more than `sigma_m` along any axis. The tilt
+  /// of the start does not count: it turns the map as a whole.
+  [[nodiscard]] int sure_since(const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
+                               double sigma_m) const;
 
   /// The pose was measured along unit `axes` (odom) against planes that scan number `scan` mapped. What that takes from
   /// the filter's covariance is only known against those planes: along these axes the position is never known better
@@ -53,26 +55,34 @@ class MapDrift {
   [[nodiscard]] Matrix6d pose_covariance(const Pose& T_odom_body) const;
 
  private:
+  void forget_one();
   [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
+  [[nodiscard]] Eigen::Matrix3d shift_by_tilt(const Eigen::Vector3d& position) const;
 
   struct Placement {
     int scan = 0;
     Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d in_map = Eigen::Matrix3d::Zero();  ///< the same without the tilt of the start
 
     friend void transfer(auto& io, FieldsOf<Placement> auto& placement) {
       io.number(placement.scan);
       io.matrix(placement.position_covariance);
+      io.matrix(placement.in_map);
     }
   };
 
   double scale_;
   Matrix6d covariance_ = Matrix6d::Zero();
-  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();  ///< where covariance_ is meant
-  std::deque<Placement> placements_;                    ///< every tenth scan of the last minutes, oldest first
+  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();    ///< where covariance_ is meant
+  Eigen::Matrix3d start_tilt_ = Eigen::Matrix3d::Zero();  ///< of the frame against the level one [rad^2]
+  Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
+  std::deque<Placement> placements_;  ///< every tenth scan at first, the older the fewer; oldest first
 
   friend void transfer(auto& io, FieldsOf<MapDrift> auto& drift) {
     io.matrix(drift.covariance_);
     io.matrix(drift.position_);
+    io.matrix(drift.start_tilt_);
+    io.matrix(drift.start_);
     io.list(drift.placements_);
   }
 };

@@ -66,7 +66,7 @@ class ScanPath {
     every_nth(cloud_, config_.max_scan_points, points_);
     if (!map_.empty()) matched_ += matcher_.match(filter_, Pose(), points_, map_).stats.applied() ? 1 : 0;
     map_.insert(cloud_, Pose(), true);
-    map_.slide(Eigen::Vector3d::Zero());
+    map_.slide(Eigen::Vector3d::Zero(), 0);
   }
 
   [[nodiscard]] int matched() const { return matched_; }

@@ -101,6 +101,21 @@ TEST(Fault_F3, TheScanThatCorrectsAWrongVelocityIsDeskewedWithTheRightOne) {
   }
 }
 
+TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
+  Drive input = drive();
+  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
+    sample->accel.x() = 25.0;
+    sample->saturated = true;
+  }
+  const Watched run(input);
+  // A scan tells the position at the mean instant of its points, so what is not known of the velocity adds to that of
+  // its end: their covariance is the mean age of the points times the velocity's variance.
+  const ScanResult& scan = run.scans[160];
+  const double velocity_variance = scan.covariance(kVelocity, kVelocity);
+  ASSERT_GT(velocity_variance, 1.0) << "m^2/s^2: the clipped axis has cost it";
+  EXPECT_NEAR(scan.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005) << "s";
+}
+
 TEST(Fault_F3, StandingAfterAClippedSampleTeachesTheBiasesNothingEither) {
   Drive input = test::simulate(test::furnished_hall(), test::straight_drive(20.0, 0.5), 12.0, Sensors{}, 3);
   auto clipped = sample_at(input, 8.0);

@@ -266,16 +266,21 @@ TEST(LocalMap, UnconfirmedPointsNeverReplaceConfirmedOnes) {
   EXPECT_LT((map.points()[0] - Eigen::Vector3d(0.02, 0.02, 0.02)).norm(), 1e-6);
 }
 
+/// What the scans of a vehicle that stays there do.
+void slide_at(LocalMap& map, const Eigen::Vector3d& position, int sure_since) {
+  for (int i = 0; i < 20; ++i) map.slide(position, sure_since);
+}
+
 TEST(LocalMap, SlidesOnlyAfterAQuarterOfTheWindow) {
   FrontendConfig config;
   LocalMap map(config);
-  map.slide(Eigen::Vector3d::Zero());
+  map.slide(Eigen::Vector3d::Zero(), 0);
   map.insert(random_points(3, 5000, 18.0F), {}, true);
   const int before = map.size();
-  map.slide({4.9, 0.0, 0.0});
+  slide_at(map, {4.9, 0.0, 0.0}, 0);
   EXPECT_EQ(map.size(), before);
   const Eigen::Vector3d position(5.1, 0.0, 0.0);
-  map.slide(position);
+  slide_at(map, position, 0);
   EXPECT_LT(map.size(), before);
   for (const Eigen::Vector3d& point : map.points()) {
     EXPECT_LE(std::abs(point.x() - position.x()), config.map_window_m);
@@ -286,13 +291,47 @@ TEST(LocalMap, SlidesOnlyAfterAQuarterOfTheWindow) {
   EXPECT_GE(found.count, 1) << "the table must find what is left after a prune";
 }
 
+TEST(LocalMap, KeepsWhatIsSurelyPlacedBeyondTheWindow) {
+  FrontendConfig config;
+  config.map_memory_m = 60.0;
+  LocalMap map(config);
+  map.slide(Eigen::Vector3d::Zero(), 0);
+  map.insert(std::vector<Eigen::Vector3f>{{0.0F, 0.0F, 0.0F}}, {}, true);
+  map.insert(std::vector<Eigen::Vector3f>{{1.0F, 0.0F, 0.0F}}, {}, true);
+  map.insert(std::vector<Eigen::Vector3f>{{1.0F, 8.5F, 0.0F}}, {}, true);
+  slide_at(map, {15.0, 0.0, 0.0}, 2);
+  EXPECT_EQ(map.size(), 2) << "inside the window all but what lies too high";
+  slide_at(map, {30.0, 0.0, 0.0}, 2);
+  ASSERT_EQ(map.size(), 1) << "outside what is sure";
+  EXPECT_NEAR(map.points()[0].x(), 1.0, 1e-6) << "the second scan's";
+  EXPECT_EQ(map.gather({1.0, 0.0, 0.0}).count, 1);
+  slide_at(map, {62.0, 0.0, 0.0}, 2);
+  EXPECT_TRUE(map.empty());
+}
+
+TEST(LocalMap, FindsAllThatIsLeftWhileItIsBeingSwept) {
+  LocalMap map(FrontendConfig{});
+  map.slide(Eigen::Vector3d::Zero(), 0);
+  map.insert(random_points(3, 5000, 18.0F), {}, true);
+  const int before = map.size();
+  const Eigen::Vector3d position(9.0, 0.0, 0.0);
+  for (int i = 0; i < 20; ++i) {
+    const int size = map.size();
+    map.slide(position, 0);
+    EXPECT_LT(size - map.size(), before / 4) << "no scan bears the cost of all";
+    map.insert(random_points(static_cast<std::uint32_t>(10 + i), 50, 10.0F), {}, true);
+    for (const Eigen::Vector3d& point : map.points()) ASSERT_GE(map.gather(point).count, 1);
+  }
+  EXPECT_LT(map.size(), before);
+}
+
 TEST(LocalMap, StaysBoundedOnALongDrive) {
   LocalMap map(FrontendConfig{});
   int largest = 0;
   for (int i = 0; i < 200; ++i) {
     const Pose T_odom_body{Eigen::Quaterniond::Identity(), {2.0 * i, 0.0, 0.0}};
     map.insert(random_points(static_cast<std::uint32_t>(i), 500, 10.0F), T_odom_body, true);
-    map.slide(T_odom_body.translation);
+    map.slide(T_odom_body.translation, 0);
     largest = std::max(largest, map.size());
   }
   EXPECT_LT(largest, 500 * 20);

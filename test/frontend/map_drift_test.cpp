@@ -86,9 +86,9 @@ TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
 struct Drifted : ::testing::Test {
   Drifted() {
     drift.begin(first_state(Eigen::Vector2d::Zero()));
-    drift.remember(10, 1e-4 * Eigen::Matrix3d::Identity());
-    drift.remember(110, Eigen::Matrix3d::Identity());
-    drift.remember(210, 4.0 * Eigen::Matrix3d::Identity());
+    drift.remember(10, 1e-4 * Eigen::Matrix3d::Identity(), kStart.translation);
+    drift.remember(110, Eigen::Matrix3d::Identity(), kStart.translation);
+    drift.remember(210, 4.0 * Eigen::Matrix3d::Identity(), kStart.translation);
   }
   [[nodiscard]] Eigen::Vector3d variances() const { return published(drift, kStart).diagonal().segment<3>(kPosition); }
 
@@ -125,22 +125,42 @@ TEST_F(Drifted, APlaneOfTheNewestScansIsHeldToTheNewestThatIsRemembered) {
 
 TEST_F(Drifted, PlanesAreSureSinceThePositionWasAsWellKnownAsNow) {
   const Eigen::Matrix3d now = 4.01 * Eigen::Matrix3d::Identity();
-  EXPECT_EQ(drift.sure_since(now, 3.0), 0) << "within three metres all of them";
-  EXPECT_EQ(drift.sure_since(now, 1.9), 11);
-  EXPECT_EQ(drift.sure_since(now, 0.15), 111);
-  EXPECT_EQ(drift.sure_since(now, 0.05), 211);
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 3.0), 0) << "within three metres all of them";
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 1.9), 11);
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.15), 111);
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.05), 211);
+}
+
+TEST(MapDrift, TheTiltOfTheStartMakesNoOldPlaneDoubtful) {
+  MapDrift drift(1.0);
+  drift.begin(first_state({0.01, 0.01}));
+  const auto position_covariance = [&](const Pose& pose) {
+    return Eigen::Matrix3d(published(drift, pose).bottomRightCorner<3, 3>());
+  };
+  drift.remember(10, position_covariance(kStart), kStart.translation);
+  Pose far = kStart;
+  far.translation.z() -= 50.0;
+  EXPECT_EQ(drift.sure_since(position_covariance(far), far.translation, 0.001), 0) << "it has turned both alike";
+  const Eigen::Matrix3d vaguer = position_covariance(far) + 1e-4 * Eigen::Matrix3d::Identity();
+  EXPECT_EQ(drift.sure_since(vaguer, far.translation, 0.009), 11);
 }
 
 TEST_F(Drifted, ANewMapForgetsThePlacesOfTheOld) {
-  drift.remember(1, 0.25 * Eigen::Matrix3d::Identity());
+  drift.remember(1, 0.25 * Eigen::Matrix3d::Identity(), kStart.translation);
   drift.hold_to(300.0, along, kStart);
   EXPECT_NEAR(variances().z(), 0.25, 1e-12);
 }
 
-TEST(MapDrift, RemembersTheLastMinutesOnly) {
+TEST(MapDrift, RemembersAnHourWithoutGrowing) {
   MapDrift drift(1.0);
   drift.begin(first_state(Eigen::Vector2d::Zero()));
-  for (int scan = 0; scan < 20'000; ++scan) drift.remember(scan, scan * Eigen::Matrix3d::Identity());
+  constexpr int kHour = 72'000;
+  for (int scan = 0; scan < kHour; ++scan) drift.remember(scan, scan * Eigen::Matrix3d::Identity(), kStart.translation);
+  for (const int then : {kHour / 100, kHour / 10, kHour - 100}) {
+    const double growth = std::sqrt(static_cast<double>(kHour - then));
+    const int since = drift.sure_since(kHour * Eigen::Matrix3d::Identity(), kStart.translation, growth);
+    EXPECT_NEAR(since, then, 0.05 * (kHour - then) + 10);
+  }
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);
   transfer(writer, std::as_const(drift));
