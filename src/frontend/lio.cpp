@@ -246,7 +246,8 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   published.covariance.topLeftCorner<6, 6>() += drift_.pose_covariance(filter_.nominal.T_odom_body);
   auto position_covariance = published.covariance.block<3, 3>(kPosition, kPosition);
   position_covariance += tilt_of_blind_shifts(match.degeneracy, position_covariance);
-  drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation);
+  drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation,
+                  blind_shifts(match.degeneracy));
   result.covariance = published.covariance.topLeftCorner<15, 15>();
   if (velocity_known_) {
     result.keyframe =
@@ -303,8 +304,10 @@ void Lio::count_correction(const MatchResult& match, double age) {
       salient ? information_update(seen, ErrorVector::Zero(), match.salient.constraints) : UpdateStep{};
   if (along.ok) seen = along.covariance;
   cautious_ = with_position_at(seen, age);
-  if (!salient) return;
-  drift_.hold_to(match.salient.mean_scan, blind_shifts(match.degeneracy), filter_.nominal.T_odom_body);
+  const Pose& T_odom_body = filter_.nominal.T_odom_body;
+  const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
+  drift_.hand_over(blind, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
+  if (salient) drift_.hold_to(match.salient.mean_scan, blind, T_odom_body);
 }
 
 void Lio::follow_moving_start(ScanReason reason) {
@@ -327,7 +330,9 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (trust_.awaits_confirmation()) return;
   const bool applied = match.stats.applied();
   if (applied && match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
-  if (applied) drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body, match.map_age_scans);
+  if (applied)
+    drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body, match.map_age_scans,
+                    blind_shifts(match.degeneracy));
   grow_map(cloud, match);
 }
 

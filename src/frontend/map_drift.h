@@ -19,9 +19,11 @@ namespace ignis {
 /// old, a share of 1 / age of that error stays for good: e_k = mean(e_j over the last 2 x age scans) + n_k is a random
 /// walk with a step of n_k / age. Scans that meet the same planes share the planes' errors for about `age` scans, so
 /// the steps are not independent, and the variance of the walk grows by that number: by (covariance of the pose in the
-/// map) / age per scan. The same rule hands over what grew along a direction that no scan observed: once structure
-/// comes back into view, the filter's covariance shrinks against a map that was shifted along with the pose, and the
-/// shift stays.
+/// map) / age per scan.
+///
+/// Along a direction that no scan observes nothing is measured against the map: there the filter's covariance says it
+/// all while that lasts. Once structure comes back into view, that shrinks against planes which were shifted along with
+/// the pose when they were mapped, and what they were off by then stays (hand_over).
 ///
 /// Kept as the covariance of (turn of the map about the body, shift), both in odom axes, at the present position.
 class MapDrift {
@@ -33,12 +35,20 @@ class MapDrift {
   void begin(const FilterState& first);
 
   /// A scan entered the map at a pose that is known in the map with `pose_covariance` (order of ErrorBlock), which is
-  /// made of points of the age `age_scans` on average.
-  void add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans);
+  /// made of points of the age `age_scans` on average. It did not observe shifts along the unit axes `blind` (odom).
+  void add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans,
+                std::span<const Eigen::Vector3d> blind);
 
   /// Remembers how well a position was known [m^2, odom axes, published covariance] when the map's scan number
-  /// `scan` was placed there. Numbers ascend; a smaller one begins a new map. Of what is old only some are kept.
-  void remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position);
+  /// `scan` was placed there, and which shifts it did not observe. Numbers ascend; a smaller one begins a new map. Of
+  /// what is old only some are kept.
+  void remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
+                std::span<const Eigen::Vector3d> blind);
+
+  /// After a scan that leaves the pose known in the map with `in_map` [m^2, odom axes] and does not observe `blind`
+  /// shifts. What came into view along an axis that was blind until now was mapped on the way here, so the position is
+  /// not known better along it than it was at the last call of remember().
+  void hand_over(std::span<const Eigen::Vector3d> blind, const Pose& T_odom_body, const Eigen::Matrix3d& in_map);
 
   /// The first scan whose planes are sure to be the ones that are met now: since then the position, of which
   /// `position_covariance` is published now, has become less certain by no more than `sigma_m` along any axis. The tilt
@@ -55,10 +65,6 @@ class MapDrift {
   [[nodiscard]] Matrix6d pose_covariance(const Pose& T_odom_body) const;
 
  private:
-  void forget_one();
-  [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
-  [[nodiscard]] Eigen::Matrix3d shift_by_tilt(const Eigen::Vector3d& position) const;
-
   struct Placement {
     int scan = 0;
     Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
@@ -71,11 +77,19 @@ class MapDrift {
     }
   };
 
+  void forget_one();
+  void widen_to(const Eigen::Matrix3d& position_covariance, const Eigen::Matrix3d& in_map,
+                std::span<const Eigen::Vector3d> axes);
+  [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
+  [[nodiscard]] Eigen::Matrix3d shift_by_tilt(const Eigen::Vector3d& position) const;
+
   double scale_;
   Matrix6d covariance_ = Matrix6d::Zero();
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();    ///< where covariance_ is meant
   Eigen::Matrix3d start_tilt_ = Eigen::Matrix3d::Zero();  ///< of the frame against the level one [rad^2]
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d last_published_ = Eigen::Matrix3d::Zero();  ///< of the position, at the last scan
+  Eigen::Matrix3d last_blind_ = Eigen::Matrix3d::Zero();      ///< projects on the shifts that it did not observe
   std::deque<Placement> placements_;  ///< every tenth scan at first, the older the fewer; oldest first
 
   friend void transfer(auto& io, FieldsOf<MapDrift> auto& drift) {
@@ -83,6 +97,8 @@ class MapDrift {
     io.matrix(drift.position_);
     io.matrix(drift.start_tilt_);
     io.matrix(drift.start_);
+    io.matrix(drift.last_published_);
+    io.matrix(drift.last_blind_);
     io.list(drift.placements_);
   }
 };

@@ -74,11 +74,11 @@ TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
   drift.begin(first_state(Eigen::Vector2d::Zero()));
   Matrix6d covariance = 1e-6 * Matrix6d::Identity();
   covariance(kPosition + 2, kPosition + 2) = 1e-2;  // not observed
-  drift.add_scan(covariance, kStart, 10.0);
+  drift.add_scan(covariance, kStart, 10.0, {});
   EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 / 10.0, 1e-12);
   EXPECT_NEAR(published(drift, kStart)(kPosition + 2, kPosition + 2), 2.0 * 1e-2 / 10.0, 1e-9);
   EXPECT_NEAR(published(drift, kStart)(kAttitude, kAttitude), 2.0 * 1e-6 / 10.0, 1e-12);
-  drift.add_scan(covariance, kStart, 0.0);
+  drift.add_scan(covariance, kStart, 0.0, {});
   EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 * 1.1, 1e-12) << "at least one scan old";
 }
 
@@ -86,9 +86,9 @@ TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
 struct Drifted : ::testing::Test {
   Drifted() {
     drift.begin(first_state(Eigen::Vector2d::Zero()));
-    drift.remember(10, 1e-4 * Eigen::Matrix3d::Identity(), kStart.translation);
-    drift.remember(110, Eigen::Matrix3d::Identity(), kStart.translation);
-    drift.remember(210, 4.0 * Eigen::Matrix3d::Identity(), kStart.translation);
+    drift.remember(10, 1e-4 * Eigen::Matrix3d::Identity(), kStart.translation, {});
+    drift.remember(110, Eigen::Matrix3d::Identity(), kStart.translation, {});
+    drift.remember(210, 4.0 * Eigen::Matrix3d::Identity(), kStart.translation, {});
   }
   [[nodiscard]] Eigen::Vector3d variances() const { return published(drift, kStart).diagonal().segment<3>(kPosition); }
 
@@ -131,13 +131,51 @@ TEST_F(Drifted, PlanesAreSureSinceThePositionWasAsWellKnownAsNow) {
   EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.05), 211);
 }
 
+TEST(MapDrift, WhatNoScanObservedIsCountedOnceItIsMeasuredAgain) {
+  MapDrift drift(1.0);
+  drift.begin(first_state(Eigen::Vector2d::Zero()));
+  const std::array<Eigen::Vector3d, 1> along{Eigen::Vector3d::UnitZ()};
+  Matrix6d in_map = 1e-6 * Matrix6d::Identity();
+  double& along_variance = in_map(kPosition + 2, kPosition + 2);
+  for (int scan = 1; scan <= 200; ++scan) {  // a corridor
+    along_variance = 1e-4 * scan;
+    drift.add_scan(in_map, kStart, 10.0, along);
+    drift.remember(scan, (in_map + published(drift, kStart)).bottomRightCorner<3, 3>(), kStart.translation, along);
+  }
+  EXPECT_LT(published(drift, kStart)(kPosition + 2, kPosition + 2), 1e-9) << "the filter's own covariance says it";
+  EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 200 * 1e-7, 1e-9) << "as for any observed direction";
+
+  along_variance = 1e-6;  // against an end wall that was mapped on the way
+  const Eigen::Matrix3d position = in_map.bottomRightCorner<3, 3>();
+  drift.hand_over(along, kStart, position);
+  EXPECT_LT(published(drift, kStart)(kPosition + 2, kPosition + 2), 1e-9) << "not measured yet";
+  drift.hand_over({}, kStart, position);
+  EXPECT_NEAR(published(drift, kStart)(kPosition + 2, kPosition + 2), 200e-4 - 1e-6, 1e-9);
+  EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 200 * 1e-7, 1e-9);
+}
+
+TEST(MapDrift, ABlindDirectionThatTurnsHandsOverWhatItLeaves) {
+  MapDrift drift(1.0);
+  drift.begin(first_state(Eigen::Vector2d::Zero()));
+  const std::array<Eigen::Vector3d, 1> before{Eigen::Vector3d::UnitZ()};
+  const Eigen::Matrix3d position = Eigen::Vector3d(1e-6, 1e-6, 1.0).asDiagonal();
+  drift.remember(1, position, kStart.translation, before);
+  constexpr double kTurn = 0.1;
+  const std::array<Eigen::Vector3d, 1> after{Eigen::Vector3d(std::sin(kTurn), 0.0, std::cos(kTurn))};
+  const Eigen::Vector3d across(std::cos(kTurn), 0.0, -std::sin(kTurn));
+  drift.hand_over(after, kStart, 1e-6 * Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d shift = published(drift, kStart).bottomRightCorner<3, 3>();
+  EXPECT_NEAR(std::sqrt(across.dot(shift * across)), std::sin(kTurn), 1e-3);
+  EXPECT_NEAR(after[0].dot(shift * after[0]), 0.0, 1e-9);
+}
+
 TEST(MapDrift, TheTiltOfTheStartMakesNoOldPlaneDoubtful) {
   MapDrift drift(1.0);
   drift.begin(first_state({0.01, 0.01}));
   const auto position_covariance = [&](const Pose& pose) {
     return Eigen::Matrix3d(published(drift, pose).bottomRightCorner<3, 3>());
   };
-  drift.remember(10, position_covariance(kStart), kStart.translation);
+  drift.remember(10, position_covariance(kStart), kStart.translation, {});
   Pose far = kStart;
   far.translation.z() -= 50.0;
   EXPECT_EQ(drift.sure_since(position_covariance(far), far.translation, 0.001), 0) << "it has turned both alike";
@@ -146,7 +184,7 @@ TEST(MapDrift, TheTiltOfTheStartMakesNoOldPlaneDoubtful) {
 }
 
 TEST_F(Drifted, ANewMapForgetsThePlacesOfTheOld) {
-  drift.remember(1, 0.25 * Eigen::Matrix3d::Identity(), kStart.translation);
+  drift.remember(1, 0.25 * Eigen::Matrix3d::Identity(), kStart.translation, {});
   drift.hold_to(300.0, along, kStart);
   EXPECT_NEAR(variances().z(), 0.25, 1e-12);
 }
@@ -155,7 +193,8 @@ TEST(MapDrift, RemembersAnHourWithoutGrowing) {
   MapDrift drift(1.0);
   drift.begin(first_state(Eigen::Vector2d::Zero()));
   constexpr int kHour = 72'000;
-  for (int scan = 0; scan < kHour; ++scan) drift.remember(scan, scan * Eigen::Matrix3d::Identity(), kStart.translation);
+  for (int scan = 0; scan < kHour; ++scan)
+    drift.remember(scan, scan * Eigen::Matrix3d::Identity(), kStart.translation, {});
   for (const int then : {kHour / 100, kHour / 10, kHour - 100}) {
     const double growth = std::sqrt(static_cast<double>(kHour - then));
     const int since = drift.sure_since(kHour * Eigen::Matrix3d::Identity(), kStart.translation, growth);
