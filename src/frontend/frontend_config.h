@@ -70,6 +70,8 @@ struct FrontendConfig {
   double lost_sigma_m = 1.0;
   int min_scan_points = 50;
   int min_matches = 20;
+  double shock_accel_m_s2 = 30.0;
+  double shock_gyro_rad_s = 5.0;
   double map_memory_m = 20.0;
   double map_memory_sigma_m = 0.05;
   int max_scan_points = 3000;
@@ -212,9 +214,12 @@ struct FrontendConfig {
                  "largest position sigma of a pose that is still of use");
     visit.integer("min_scan_points", self.min_scan_points, {1, 100000}, "points", "fewer: the scan is skipped");
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
-    visit.number(
-        "map_memory_m", self.map_memory_m, {1.0, 500.0}, "m",
-        "the local map reaches so far where it is as surely placed as the vehicle; map_window_m if that is more");
+    visit.number("shock_accel_m_s2", self.shock_accel_m_s2, {0.0, 1000.0}, "m/s^2",
+                 "a sample that differs from gravity by more is a shock, believed as little as a clipped one; 0: none");
+    visit.number("shock_gyro_rad_s", self.shock_gyro_rad_s, {0.0, 100.0}, "rad/s",
+                 "the same for a sample that turns faster; 0: none");
+    visit.number("map_memory_m", self.map_memory_m, {1.0, 500.0}, "m",
+                 "the local map reaches so far where it is surely placed; map_window_m if that is more");
     visit.number("map_memory_sigma_m", self.map_memory_sigma_m, {1e-3, 10.0}, "m",
                  "growth of the position's sigma since then, up to which a part of the map counts as surely placed");
     visit.integer("max_scan_points", self.max_scan_points, {100, 200000}, "points",

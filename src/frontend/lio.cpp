@@ -35,6 +35,13 @@ double velocity_sigma(const FilterState& filter) {
   return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
 }
 
+/// What hits the sensor does not move the vehicle as it says: the mount springs back.
+bool is_shock(const ImuSample& sample, const FrontendConfig& config) {
+  const auto exceeds = [](double value, double limit) { return limit > 0.0 && value > limit; };
+  return exceeds(std::abs(sample.accel.norm() - config.gravity_m), config.shock_accel_m_s2) ||
+         exceeds(sample.gyro.norm(), config.shock_gyro_rad_s);
+}
+
 }  // namespace
 
 Lio::Lio(const FrontendConfig& config, std::int32_t session, std::string note)
@@ -86,13 +93,15 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   ImuResult result;
   if (resumed_from_) close_gap(sample.utime);
   const std::optional<Utime> before = imu_.empty() ? std::nullopt : std::optional(imu_.newest());
-  result.fault = imu_.add(sample);
+  ImuSample believed = sample;
+  believed.saturated = sample.saturated || is_shock(sample, config_);
+  result.fault = imu_.add(believed);
   if (result.fault != ImuFault::kNone) return result;
   if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
   const Silence silence = before ? bridge_silence(*before, sample.utime, result.scans) : Silence::kNone;
   if (silence == Silence::kTooLong) return result;
   trust_.note_imu(sample.utime);
-  if (sample.saturated) last_clipped_ = sample.utime;
+  if (believed.saturated) last_clipped_ = sample.utime;
 
   if (running_ && silence == Silence::kNone) {
     const std::size_t last = imu_.samples().size() - 1;
@@ -359,19 +368,6 @@ void Lio::begin_new_map() {
   ++session_;
   keyframer_ = Keyframer(config_, session_);
   trust_.note_loss();
-}
-
-/// Undoes what a scan did to the biases and to gravity. Their correlations with the rest are given up, which only
-/// widens the rest.
-void Lio::keep_biases(const FilterState& predicted) {
-  filter_.nominal.gyro_bias = predicted.nominal.gyro_bias;
-  filter_.nominal.accel_bias = predicted.nominal.accel_bias;
-  filter_.nominal.angular_rate = predicted.nominal.angular_rate;
-  filter_.nominal.gravity_tilt = predicted.nominal.gravity_tilt;
-  constexpr int kKept = kErrorSize - kGyroBias;
-  filter_.covariance.rightCols<kKept>().setZero();
-  filter_.covariance.bottomRows<kKept>().setZero();
-  filter_.covariance.bottomRightCorner<kKept, kKept>() = predicted.covariance.bottomRightCorner<kKept, kKept>();
 }
 
 /// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.

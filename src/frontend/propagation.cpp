@@ -81,4 +81,17 @@ void Lio::coast_to(Utime utime) {
 /// True while the filter's own samples, clipped or coasting, would teach the biases what is not so.
 bool Lio::learns_nothing() const { return last_clipped_ && filter_.nominal.utime - *last_clipped_ < kClipMemoryUs; }
 
+/// Undoes what a scan did to the biases and to gravity. Their correlations with the rest are given up, which only
+/// widens the rest.
+void Lio::keep_biases(const FilterState& predicted) {
+  filter_.nominal.gyro_bias = predicted.nominal.gyro_bias;
+  filter_.nominal.accel_bias = predicted.nominal.accel_bias;
+  filter_.nominal.angular_rate = predicted.nominal.angular_rate;
+  filter_.nominal.gravity_tilt = predicted.nominal.gravity_tilt;
+  constexpr int kKept = kErrorSize - kGyroBias;
+  filter_.covariance.rightCols<kKept>().setZero();
+  filter_.covariance.bottomRows<kKept>().setZero();
+  filter_.covariance.bottomRightCorner<kKept, kKept>() = predicted.covariance.bottomRightCorner<kKept, kKept>();
+}
+
 }  // namespace ignis

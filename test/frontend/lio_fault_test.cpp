@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "frontend/fault_drive.h"
 
@@ -114,6 +115,25 @@ TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
   const double velocity_variance = scan.covariance(kVelocity, kVelocity);
   ASSERT_GT(velocity_variance, 1.0) << "m^2/s^2: the clipped axis has cost it";
   EXPECT_NEAR(scan.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005) << "s";
+}
+
+TEST(Fault_F3, AShockCostsNeitherThePlaceNorTheSession) {
+  Drive input = drive();
+  const auto begin = sample_at(input, 8.0);
+  for (auto sample = begin; sample != sample_at(input, 8.02); ++sample) {  // half a sine of 60 m/s^2: 0.8 m/s
+    const double phase = 1e-6 * static_cast<double>(sample->utime - begin->utime) / 0.02;
+    sample->accel.x() += 60.0 * std::sin(std::numbers::pi * phase);
+    sample->gyro.y() += 8.0 * std::sin(std::numbers::pi * phase);
+  }
+  const Watched run(input);
+  int refused = 0;
+  for (const ScanResult& scan : run.scans) {
+    EXPECT_EQ(scan.stats.session, run.scans.front().stats.session);
+    refused += scan.stats.utime > begin->utime && !scan.stats.applied() ? 1 : 0;
+  }
+  EXPECT_LE(refused, 2);
+  for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
+  EXPECT_LT(run.error_at_end(), 0.3);
 }
 
 TEST(Fault_F3, StandingAfterAClippedSampleTeachesTheBiasesNothingEither) {
