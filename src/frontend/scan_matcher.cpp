@@ -20,6 +20,11 @@ constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say littl
 // A map of so many points, a second of L1 scans, adds as much to a distance as the point does. NIS of a standing L1 in
 // that second: 100 to 200 without this, 2 to 6 of 6 degrees of freedom with it.
 constexpr double kNoisyMapPoints = 20'000.0;
+// Map points that are younger than this on average, half a second of L1 scans, may be those of something that moves: it
+// was elsewhere before. Looked for among 6, 10 and 14.
+constexpr double kScansOfANewSurface = 10.0;
+constexpr double kLeastSettledShare = 0.3;   // of a scan's planes: below, the place is new and not what is in it
+constexpr double kKnownSpeed = 0.05;         // m/s, sigma
 constexpr double kShareOfNewestScan = 0.1;   // in running means: half a second of scans
 constexpr double kKnownShift = 0.1;          // m: a direction that salient points hold so well is not reported as open
 constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
@@ -58,6 +63,7 @@ ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), wide_c
 MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start,
                                std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since) {
   salient_since_ = salient_since;
+  speed_is_known_ = largest_sigma(predicted.covariance, kVelocity) < kKnownSpeed;
   MatchResult result;
   result.filter = predicted;
   result.filter.nominal.T_odom_body = T_start;
@@ -94,9 +100,6 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
 void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
   constraints_.clear();
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
-  double range_sum = 0.0;
-  double scan_sum = 0.0;
-  double variance_sum = 0.0;
   for (std::size_t begin = 0; begin < points_body.size(); begin += kPointsTogether) {
     const auto points = points_body.subspan(begin, std::min(kPointsTogether, points_body.size() - begin));
     queries_.clear();
@@ -107,15 +110,32 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
       constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), 1.0});
-      range_sum += point_body.norm();
-      scan_sum += plane.mean_scan;
-      variance_sum += variance_across(plane);
     }
+  }
+  leave_out_new_surfaces(map.scans());
+  double range_sum = 0.0;
+  double scan_sum = 0.0;
+  double variance_sum = 0.0;
+  for (const Constraint& constraint : constraints_) {
+    range_sum += constraint.point_body.norm();
+    scan_sum += constraint.plane.mean_scan;
+    variance_sum += variance_across(constraint.plane);
   }
   const double count = std::max(static_cast<double>(constraints_.size()), 1.0);
   mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / count, 0.1);
   mean_map_scan_ = scan_sum / count;
   pooled_variance_ = variance_sum / count;
+}
+
+void ScanMatcher::leave_out_new_surfaces(int newest_scan) {
+  if (!speed_is_known_) return;
+  const auto is_new = [&](const Constraint& constraint) {
+    return constraint.plane.mean_scan > newest_scan - kScansOfANewSurface;
+  };
+  const auto settled = std::ssize(constraints_) - std::ranges::count_if(constraints_, is_new);
+  const double needed =
+      std::max(kLeastSettledShare * static_cast<double>(constraints_.size()), static_cast<double>(config_.min_matches));
+  if (static_cast<double>(settled) >= needed) std::erase_if(constraints_, is_new);
 }
 
 void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from) {

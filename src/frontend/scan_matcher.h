@@ -70,6 +70,11 @@ class ScanMatcher {
   };
 
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
+  /// Drops the constraints to surfaces that the map has held for a moment only, as long as enough is left without them.
+  /// What moves is always new where it is. It is a small part of a scan, yet along an aisle whose ends are out of range
+  /// a forklift that goes by can be most of what faces along the way, and it says what its own speed is. What stands is
+  /// new only when it has just come into sight. A vehicle that does not know its own speed sees all that stands move.
+  void leave_out_new_surfaces(int newest_scan);
   /// Replaces planes_ by those nearest to queries_.
   void find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from);
   void fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config, double radius);
@@ -110,6 +115,7 @@ class ScanMatcher {
   double mean_map_scan_ = 0.0;    ///< number of the scan that a met map point comes from
   double pooled_variance_ = 0.0;  ///< see is_salient
   int salient_since_ = 0;
+  bool speed_is_known_ = false;
   double salient_share_ = 0.0;  ///< of the matched points, running mean over half a second of scans
 
   friend void transfer(auto& io, FieldsOf<ScanMatcher> auto& matcher) {

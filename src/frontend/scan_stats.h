@@ -43,7 +43,7 @@ struct ScanStats {
   std::int32_t session = 0;  ///< +1 per reset
   ScanReason reason = ScanReason::kNotInitialised;
   int points = 0;                    ///< after the range filter
-  int matched = 0;                   ///< points that found a plane
+  int matched = 0;                   ///< points that found a plane, new surfaces left out
   int used = 0;                      ///< of these, inside the Mahalanobis gate in the last pass
   double mean_innovation = 0.0;      ///< [m] mean absolute distance at the predicted pose
   double mean_residual = 0.0;        ///< [m] the same at the corrected pose

@@ -119,7 +119,7 @@ class Sampler {
     scan.duration_us = static_cast<std::int32_t>(to_micros(duration));
     for (const Beam& beam : sensors_.car ? car_beams(duration) : l1_beams(start, duration)) {
       const Pose pose = truth_(start + beam.dt);
-      const double range = world_.cast(pose.translation, pose.rotation * beam.direction);
+      const double range = world_.cast(pose.translation, pose.rotation * beam.direction, start + beam.dt);
       if (range <= 0.0 || range > sensors_.max_range) continue;
       const double noisy = range + sensors_.range_sigma * normal_(random_);
       const double measured = std::round(noisy / sensors_.range_grid) * sensors_.range_grid;
@@ -146,12 +146,19 @@ class Sampler {
 
 }  // namespace
 
-double World::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+Box Mover::at(double seconds) const {
+  const Eigen::Vector3d shift = std::max(seconds - start_s, 0.0) * velocity;
+  return {at_start.lo + shift, at_start.hi + shift};
+}
+
+double World::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double seconds) const {
   double best = slab(room, origin, direction).second;
-  for (const Box& box : boxes) {
+  const auto meet = [&](const Box& box) {
     const auto [entry, exit] = slab(box, origin, direction);
     if (entry <= exit && entry > 0.0) best = std::min(best, entry);
-  }
+  };
+  for (const Box& box : boxes) meet(box);
+  for (const Mover& mover : movers) meet(mover.at(seconds));
   for (const Pillar& pillar : pillars) {
     const double distance = pillar_distance(pillar, origin, direction);
     if (distance > 0.0) best = std::min(best, distance);

@@ -23,13 +23,23 @@ struct Pillar {
   double radius;
 };
 
+/// A box on its way.
+struct Mover {
+  Box at_start;
+  Eigen::Vector3d velocity;  ///< [m/s]
+  double start_s = 0.0;      ///< stands until then
+
+  [[nodiscard]] Box at(double seconds) const;
+};
+
 struct World {
   Box room;  ///< seen from inside
   std::vector<Box> boxes;
   std::vector<Pillar> pillars;
+  std::vector<Mover> movers = {};
 
-  /// Distance to the first surface along a unit direction, or a negative number.
-  [[nodiscard]] double cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+  /// Distance to the first surface along a unit direction at an instant [s], or a negative number.
+  [[nodiscard]] double cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double seconds) const;
 };
 
 /// True pose at a time [s].
