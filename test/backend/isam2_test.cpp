@@ -164,14 +164,14 @@ TEST(Isam2, HasTheSameBitsEachTime) {
 
 TEST(Isam2, RefusesAChainThatMayBeAnywhere) {
   // No prior: where the information of the last number was, elimination leaves rounding, of either sign.
-  for (int count = 2; count < 100; ++count) {
+  for (int count = 2; count < 60; ++count) {
     Isam2 isam(settings(1, 0.0));
     gtsam::NonlinearFactorGraph factors;
     gtsam::Values values;
     for (int i = 0; i < count; ++i) {
       values.insert(X(i), gtsam::Vector1(0.3 * i));
       if (i == 0) continue;
-      const auto noise = gtsam::noiseModel::Isotropic::Sigma(1, 0.1 + 0.01 * i);
+      const auto noise = gtsam::noiseModel::Isotropic::Sigma(1, 0.1 + 0.001 * i);
       factors.emplace_shared<gtsam::BetweenFactor<gtsam::Vector1>>(X(i - 1), X(i), gtsam::Vector1(1.0), noise);
     }
     EXPECT_THROW(isam.advance(factors, values, {}), gtsam::IndeterminantLinearSystemException) << count;
