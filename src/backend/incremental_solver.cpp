@@ -7,10 +7,10 @@
 #include <gtsam/nonlinear/Marginals.h>
 
 #include <algorithm>
+#include <boost/unordered/unordered_flat_set.hpp>
 #include <cmath>
 #include <format>
 #include <limits>
-#include <unordered_set>
 #include <utility>
 
 #include "backend/isam2.h"
@@ -74,11 +74,8 @@ struct IncrementalSolver::Impl {
       Isam2::Step step = isam.advance(batch, news, removed);
       indices = std::move(step.new_factors);
       relinearised = step.relinearised;
-      for (const gtsam::Key key : step.moved) {
-        if (!isam.offset(key).allFinite()) return std::format("the solution at {} is not finite", name_of(key));
-      }
       stale.insert(step.moved.begin(), step.moved.end());
-      changed.insert(step.moved.begin(), step.moved.end());
+      changed.insert(changed.end(), step.moved.begin(), step.moved.end());
     } catch (const gtsam::IndeterminantLinearSystemException& e) {
       return std::format("the graph is undetermined near {}", name_of(e.nearbyVariable()));
     } catch (const std::exception& e) {
@@ -152,10 +149,10 @@ struct IncrementalSolver::Impl {
   std::vector<std::size_t> isam_index;                      ///< by FactorId
   std::vector<double> errors;                               ///< by FactorId: half chi-square at `values`, or kUnknown
   std::vector<FactorId> id_of;                              ///< by index in iSAM2
-  gtsam::Values values;                  ///< of each variable, the last solution that was asked for, or its first value
-  std::unordered_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
-  std::unordered_set<gtsam::Key> changed;  ///< variables that it has moved since take_changed()
-  bool relinearised = false;               ///< something, in the last update
+  gtsam::Values values;  ///< of each variable, the last solution that was asked for, or its first value
+  boost::unordered_flat_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
+  std::vector<gtsam::Key> changed;              ///< variables that it has moved since take_changed()
+  bool relinearised = false;                    ///< something, in the last update
   int rebuilds = 0;
   std::string broken;  ///< why nothing is accepted any more; empty while all is well
 };
@@ -235,9 +232,10 @@ const gtsam::Values& IncrementalSolver::estimate_of(std::span<const std::uint64_
 }
 
 std::vector<std::uint64_t> IncrementalSolver::take_changed() {
-  std::vector<std::uint64_t> changed(impl_->changed.begin(), impl_->changed.end());
-  impl_->changed.clear();
+  std::vector<std::uint64_t> changed = std::exchange(impl_->changed, {});
   std::ranges::sort(changed);
+  const auto twice = std::ranges::unique(changed);
+  changed.erase(twice.begin(), twice.end());
   return changed;
 }
 

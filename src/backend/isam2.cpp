@@ -306,17 +306,22 @@ std::vector<int> Isam2::back_substitute() {
 bool Isam2::solve(const Clique& at, double threshold) {
   const std::span<const int> variables = at.variables;
   const Eigen::Index frontal_rows = at.conditional.cols();
-  const Eigen::Index other_rows = at.conditional.rows() - 1 - frontal_rows;
-  others_.resize(other_rows);
-  Eigen::Index row = 0;
+  const Eigen::Index rows = at.conditional.rows() - 1;
+  solution_.resize(rows);
+  Eigen::Index row = frontal_rows;
   for (const int number : variables.subspan(at.frontals)) {
-    others_.segment(row, dimension(number)) = delta(number);
+    solution_.segment(row, dimension(number)) = delta(number);
     row += dimension(number);
   }
-  solution_ = at.conditional.bottomRows<1>().transpose();
-  solution_.noalias() -= at.conditional.middleRows(frontal_rows, other_rows).transpose() * others_;
-  at.conditional.topRows(frontal_rows).triangularView<Eigen::Lower>().transpose().solveInPlace(solution_);
-  if (solution_.hasNaN()) throw gtsam::IndeterminantLinearSystemException(variable(variables.front()).key);
+  // A column of the factor, below its diagonal, meets what is known already: later scalars of the clique and others.
+  for (Eigen::Index k = frontal_rows - 1; k >= 0; --k) {
+    const Eigen::Index known = rows - 1 - k;
+    const double sum = at.conditional.col(k).segment(k + 1, known).dot(solution_.tail(known));
+    solution_(k) = (at.conditional(rows, k) - sum) / at.conditional(k, k);
+  }
+  if (!solution_.head(frontal_rows).allFinite()) {
+    throw gtsam::IndeterminantLinearSystemException(variable(variables.front()).key);
+  }
   double change = 0.0;
   row = 0;
   for (const int number : variables.first(at.frontals)) {

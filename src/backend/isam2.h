@@ -150,8 +150,7 @@ class Isam2 {
   std::vector<int> unchecked_;  ///< variables that moved since the thresholds were looked at, some more than once
   EliminationFront front_;
   std::vector<double> scale_;
-  gtsam::Vector others_;    ///< offsets of a clique's variables that are eliminated above it
-  gtsam::Vector solution_;  ///< of a clique
+  gtsam::Vector solution_;  ///< offsets of a clique's variables
 };
 
 }  // namespace ignis
