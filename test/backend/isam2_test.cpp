@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <random>
 
+#include "backend/elimination_plan.h"
+
 namespace ignis {
 namespace {
 
@@ -202,6 +204,30 @@ TEST(Isam2, KeepsTwoIslandsApart) {
     EXPECT_NEAR(now.at<Pose3>(X(i)).x(), start.x() + i / 2, 1e-9) << i;
     EXPECT_NEAR(now.at<Pose3>(X(i)).z(), start.z(), 1e-9) << i;
   }
+}
+
+TEST(EliminationPlan, LetsTheMarkedGoLastAndChildrenBeforeParents) {
+  constexpr int kVariables = 40;
+  std::vector<std::vector<int>> rows;
+  for (int i = 1; i < kVariables; ++i) rows.push_back({i - 1, i});
+  rows.push_back({0, kVariables - 1});
+  const std::vector<int> dimensions(kVariables, 6);
+  std::vector<bool> last(kVariables, false);
+  last[7] = last[23] = true;
+  const std::vector<PlannedClique> plan = plan_elimination(rows, dimensions, last);
+  std::vector<int> gone;
+  std::size_t homes = 0;
+  for (std::size_t i = 0; i < plan.size(); ++i) {
+    gone.insert(gone.end(), plan[i].variables.begin(),
+                plan[i].variables.begin() + static_cast<std::ptrdiff_t>(plan[i].frontals));
+    homes += plan[i].rows.size();
+    if (i + 1 < plan.size()) {
+      EXPECT_GT(plan[i].parent, static_cast<std::ptrdiff_t>(i));
+    }
+  }
+  EXPECT_EQ(homes, rows.size());
+  ASSERT_EQ(gone.size(), static_cast<std::size_t>(kVariables));
+  EXPECT_TRUE(std::ranges::is_permutation(std::span(gone).last(2), std::vector<int>{7, 23}));
 }
 
 /// A straight chain.
