@@ -7,34 +7,31 @@
 #include <gtsam/nonlinear/Marginals.h>
 
 #include <algorithm>
+#include <boost/unordered/unordered_flat_set.hpp>
 #include <cmath>
 #include <format>
 #include <limits>
-#include <unordered_set>
 #include <utility>
 
-#include "backend/observed_isam2.h"
+#include "backend/isam2.h"
 #include "common/config_check.h"
 
 namespace ignis {
 namespace {
 
-gtsam::ISAM2Params parameters(const SolverConfig& config) {
-  gtsam::FastMap<char, gtsam::Vector> thresholds;
+Isam2Settings settings(const SolverConfig& config) {
+  Isam2Settings settings;
   gtsam::Vector6 pose;
   pose << gtsam::Vector3::Constant(config.relinearize_rotation_rad),
       gtsam::Vector3::Constant(config.relinearize_position_m);
-  thresholds['x'] = pose;
-  thresholds['v'] = gtsam::Vector3::Constant(config.relinearize_velocity);
-  thresholds['b'] = gtsam::Vector6::Constant(config.relinearize_bias);
-  gtsam::ISAM2Params params;
-  params.relinearizeThreshold = thresholds;
-  params.relinearizeSkip = config.relinearize_skip;
+  settings.thresholds['x'] = pose;
+  settings.thresholds['v'] = gtsam::Vector3::Constant(config.relinearize_velocity);
+  settings.thresholds['b'] = gtsam::Vector6::Constant(config.relinearize_bias);
+  settings.relinearize_skip = config.relinearize_skip;
   // The usual 0.001 stops back-substitution while poses are still a millimetre off; then a solver that is built anew
   // from the same factors would stand elsewhere.
-  params.optimizationParams = gtsam::ISAM2GaussNewtonParams(config.wildfire_threshold);
-  params.findUnusedFactorSlots = false;  // factor indices must stay what they were
-  return params;
+  settings.wildfire_threshold = config.wildfire_threshold;
+  return settings;
 }
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -44,20 +41,20 @@ std::string name_of(gtsam::Key key) { return std::string(gtsam::Symbol(key)); }
 }  // namespace
 
 struct IncrementalSolver::Impl {
-  explicit Impl(const SolverConfig& config) : params(parameters(config)), isam(params) {}
+  explicit Impl(const SolverConfig& config) : params(settings(config)), isam(params) {}
 
   /// Why the batch must not reach GTSAM, or an empty text.
   [[nodiscard]] std::string problem(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news) {
     if (!broken.empty()) return broken;
     for (const gtsam::Key key : news.keys()) {
-      if (isam.valueExists(key)) return std::format("variable {} exists already", name_of(key));
+      if (isam.exists(key)) return std::format("variable {} exists already", name_of(key));
     }
     for (const auto& factor : batch) {
       gtsam::Values around;
       for (const gtsam::Key key : factor->keys()) {
         if (news.exists(key)) {
           around.insert(key, news.at(key));
-        } else if (isam.valueExists(key)) {
+        } else if (isam.exists(key)) {
           around.insert(key, estimate_of(std::span(&key, 1)).at(key));
         } else {
           return std::format("a factor names the unknown variable {}", name_of(key));
@@ -72,17 +69,13 @@ struct IncrementalSolver::Impl {
 
   /// One update of iSAM2; the reason if it failed.
   [[nodiscard]] std::string update(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news,
-                                   const gtsam::FactorIndices& removed, gtsam::FactorIndices& indices) {
+                                   std::span<const std::size_t> removed, std::vector<std::size_t>& indices) {
     try {
-      ObservedIsam2::Step step = isam.advance(batch, news, removed);
+      Isam2::Step step = isam.advance(batch, news, removed);
       indices = std::move(step.new_factors);
       relinearised = step.relinearised;
-      const gtsam::VectorValues& delta = isam.solved_delta();
-      for (const gtsam::Key key : step.moved) {
-        if (!delta.at(key).allFinite()) return std::format("the solution at {} is not finite", name_of(key));
-      }
       stale.insert(step.moved.begin(), step.moved.end());
-      changed.insert(step.moved.begin(), step.moved.end());
+      changed.insert(changed.end(), step.moved.begin(), step.moved.end());
     } catch (const gtsam::IndeterminantLinearSystemException& e) {
       return std::format("the graph is undetermined near {}", name_of(e.nearbyVariable()));
     } catch (const std::exception& e) {
@@ -94,7 +87,7 @@ struct IncrementalSolver::Impl {
   /// A new iSAM2 from the living factors at the last good solution. Should even that fail, the solver keeps its last
   /// solution and refuses everything from then on.
   void rebuild() {
-    isam = ObservedIsam2(params);
+    isam = Isam2(params);
     stale.clear();
     id_of.clear();
     gtsam::NonlinearFactorGraph living;
@@ -104,7 +97,7 @@ struct IncrementalSolver::Impl {
       living.push_back(factors[id]);
       ids.push_back(id);
     }
-    gtsam::FactorIndices indices;
+    std::vector<std::size_t> indices;
     if (const std::string failure = update(living, values, {}, indices); !failure.empty()) {
       broken = "the graph cannot be rebuilt: " + failure;
       return;
@@ -138,10 +131,10 @@ struct IncrementalSolver::Impl {
   }
 
   void refresh(gtsam::Key key) {
-    gtsam::Value* moved = isam.getLinearizationPoint().at(key).retract_(isam.solved_delta().at(key));
+    gtsam::Value* moved = isam.linearisation_points().at(key).retract_(isam.offset(key));
     values.update(key, *moved);
     moved->deallocate_();
-    for (const std::size_t index : isam.getVariableIndex()[key]) errors[id_of[index]] = kUnknown;
+    for (const std::size_t index : isam.factors_of(key)) errors[id_of[index]] = kUnknown;
   }
 
   double error_of(FactorId id) {
@@ -150,16 +143,16 @@ struct IncrementalSolver::Impl {
     return errors[id];
   }
 
-  gtsam::ISAM2Params params;
-  ObservedIsam2 isam;
+  Isam2Settings params;
+  Isam2 isam;
   std::vector<gtsam::NonlinearFactor::shared_ptr> factors;  ///< by FactorId; empty when removed
   std::vector<std::size_t> isam_index;                      ///< by FactorId
   std::vector<double> errors;                               ///< by FactorId: half chi-square at `values`, or kUnknown
   std::vector<FactorId> id_of;                              ///< by index in iSAM2
-  gtsam::Values values;                  ///< of each variable, the last solution that was asked for, or its first value
-  std::unordered_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
-  std::unordered_set<gtsam::Key> changed;  ///< variables that it has moved since take_changed()
-  bool relinearised = false;               ///< something, in the last update
+  gtsam::Values values;  ///< of each variable, the last solution that was asked for, or its first value
+  boost::unordered_flat_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
+  std::vector<gtsam::Key> changed;              ///< variables that it has moved since take_changed()
+  bool relinearised = false;                    ///< something, in the last update
   int rebuilds = 0;
   std::string broken;  ///< why nothing is accepted any more; empty while all is well
 };
@@ -177,7 +170,7 @@ SolverOutcome IncrementalSolver::add(const gtsam::NonlinearFactorGraph& factors,
   SolverOutcome outcome;
   outcome.reason = impl_->problem(factors, values);
   if (!outcome.reason.empty()) return outcome;
-  gtsam::FactorIndices indices;
+  std::vector<std::size_t> indices;
   outcome.reason = impl_->update(factors, values, {}, indices);
   if (!outcome.reason.empty()) {
     impl_->recover();
@@ -200,7 +193,7 @@ SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
   SolverOutcome outcome;
   outcome.reason = impl_->broken;
   if (!outcome.reason.empty()) return outcome;
-  gtsam::FactorIndices removed;
+  std::vector<std::size_t> removed;
   for (const FactorId id : factors) {
     if (id >= impl_->factors.size() || !impl_->factors[id]) {
       outcome.reason = std::format("there is no factor {}", id);
@@ -209,7 +202,7 @@ SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
     removed.push_back(impl_->isam_index[id]);
   }
   for (const FactorId id : factors) impl_->factors[id].reset();
-  gtsam::FactorIndices none;
+  std::vector<std::size_t> none;
   outcome.reason = impl_->update({}, {}, removed, none);
   if (!outcome.reason.empty()) impl_->recover();
   outcome.accepted = true;
@@ -217,10 +210,10 @@ SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
 }
 
 bool IncrementalSolver::settle(int updates) {
-  // iSAM2 looks at the thresholds in one of relinearizeSkip updates. If it finds nothing there, it never will.
+  // iSAM2 looks at the thresholds in one of relinearize_skip updates. If it finds nothing there, it never will.
   int idle = 0;
-  for (int i = 0; i < updates && idle < impl_->params.relinearizeSkip && impl_->broken.empty(); ++i) {
-    gtsam::FactorIndices none;
+  for (int i = 0; i < updates && idle < impl_->params.relinearize_skip && impl_->broken.empty(); ++i) {
+    std::vector<std::size_t> none;
     if (!impl_->update({}, {}, {}, none).empty()) {
       impl_->recover();
       return false;
@@ -239,14 +232,15 @@ const gtsam::Values& IncrementalSolver::estimate_of(std::span<const std::uint64_
 }
 
 std::vector<std::uint64_t> IncrementalSolver::take_changed() {
-  std::vector<std::uint64_t> changed(impl_->changed.begin(), impl_->changed.end());
-  impl_->changed.clear();
+  std::vector<std::uint64_t> changed = std::exchange(impl_->changed, {});
   std::ranges::sort(changed);
+  const auto twice = std::ranges::unique(changed);
+  changed.erase(twice.begin(), twice.end());
   return changed;
 }
 
 const gtsam::Values& IncrementalSolver::linearisation_points() const {
-  return impl_->broken.empty() ? impl_->isam.getLinearizationPoint() : impl_->values;
+  return impl_->broken.empty() ? impl_->isam.linearisation_points() : impl_->values;
 }
 
 gtsam::Pose3 IncrementalSolver::pose(std::uint64_t key) {
@@ -266,7 +260,7 @@ double IncrementalSolver::half_chi_square(FactorId factor) { return impl_->error
 
 std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint64_t key) const {
   try {
-    Eigen::MatrixXd covariance = impl_->isam.marginalCovariance(key);
+    Eigen::MatrixXd covariance = impl_->isam.covariance(key);
     if (!covariance.allFinite()) return std::nullopt;
     return covariance;
   } catch (const std::exception&) {
