@@ -53,6 +53,15 @@ class Row:
     simulation: Simulation
     variant: Variant
     figures: dict[str, Any]
+    problem: str = ""  # why there are no figures
+
+
+def _row(simulation: Simulation, variant: Variant, config: Path, folder: Path, binaries: Path) -> Row:
+    """A drive that cannot be scored, such as one that never started, is a result too."""
+    try:
+        return _replay(simulation, variant, config, folder, binaries)
+    except InputError as error:
+        return Row(simulation, variant, {}, str(error))
 
 
 def _replay(simulation: Simulation, variant: Variant, config: Path, folder: Path, binaries: Path) -> Row:
@@ -82,8 +91,10 @@ def _replay(simulation: Simulation, variant: Variant, config: Path, folder: Path
     return Row(simulation, variant, figures)
 
 
-def _cells(figures: dict[str, Any]) -> str:
-    return " | ".join("" if figures[key] is None else form.format(figures[key]) for key, _, form in _COLUMNS)
+def _cells(row: Row) -> str:
+    if row.problem:
+        return " | ".join([f"failed: {row.problem}", *[""] * (len(_COLUMNS) - 1)])
+    return " | ".join("" if row.figures[key] is None else form.format(row.figures[key]) for key, _, form in _COLUMNS)
 
 
 def table(rows: list[Row]) -> str:
@@ -92,14 +103,19 @@ def table(rows: list[Row]) -> str:
     lines += ["|---" * (len(_COLUMNS) + 2) + "|"]
     ordered = sorted(rows, key=lambda row: (row.simulation.scene, row.simulation.seed))
     lines += [
-        f"| {row.simulation.scene}, {row.simulation.seed} | {row.variant.name} | {_cells(row.figures)} |"
-        for row in ordered
+        f"| {row.simulation.scene}, {row.simulation.seed} | {row.variant.name} | {_cells(row)} |" for row in ordered
     ]
     lines += ["", f"Mean NEES per degree of freedom over the seeds, and its {100 * BAND:.0f} % band:", ""]
     lines += ["| scene | variant | position | attitude | band |", "|---|---|---|---|---|"]
     groups = dict.fromkeys((row.simulation.scene, row.variant.name) for row in ordered)
     for scene, variant in groups:
-        group = [row.figures for row in ordered if (row.simulation.scene, row.variant.name) == (scene, variant)]
+        group = [
+            row.figures
+            for row in ordered
+            if (row.simulation.scene, row.variant.name) == (scene, variant) and not row.problem
+        ]
+        if not group:
+            continue
         low, high = band(3 * len(group))
         mean = {key: sum(f[key] for f in group) / len(group) for key in ("nees_position", "nees_attitude")}
         lines.append(
@@ -112,14 +128,15 @@ def table(rows: list[Row]) -> str:
 def _write(rows: list[Row], folder: Path) -> None:
     write_text(folder / "evaluation.md", table(rows))
     plain = [
-        {"scene": row.simulation.scene, "seed": row.simulation.seed, "variant": row.variant.name} | row.figures
+        {"scene": row.simulation.scene, "seed": row.simulation.seed, "variant": row.variant.name}
+        | (row.figures or {"problem": row.problem})
         for row in rows
     ]
     write_text(folder / "evaluation.json", json.dumps(plain, indent=2) + "\n")
 
 
 def evaluate(arguments: argparse.Namespace) -> int:
-    """Simulates and replays everything; both tables are written anew after each drive."""
+    """Simulates and replays everything; both tables are written anew after each drive. 1 when a replay failed."""
     missing = [name for name in arguments.scenes if not (_CHECKOUT / "config" / "scenes" / f"{name}.json").is_file()]
     if missing:
         raise InputError(f"no such scene: {', '.join(missing)}")
@@ -134,19 +151,20 @@ def evaluate(arguments: argparse.Namespace) -> int:
             scene = _CHECKOUT / "config" / "scenes" / f"{drive[0]}.json"
             inputs = arguments.out / "inputs"
             simulation = simulated(binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, inputs)
-            return [_replay(simulation, v, arguments.config, arguments.out / "runs", binaries) for v in variants]
+            return [_row(simulation, v, arguments.config, arguments.out / "runs", binaries) for v in variants]
 
         for done in concurrent.futures.as_completed([pool.submit(run, drive) for drive in drives]):
             for row in done.result():
                 rows.append(row)
+                result = row.problem or f"ATE {row.figures['ate_m']:.3f} m"
                 print(
                     f"evaluate: {len(rows)} of {len(drives) * len(variants)}: {row.simulation.name} "
-                    f"{row.variant.name}: ATE {row.figures['ate_m']:.3f} m",
+                    f"{row.variant.name}: {result}",
                     flush=True,
                 )
             _write(rows, arguments.out)
     print(f"\n{table(rows)}\n{arguments.out / 'evaluation.md'}")
-    return 0
+    return 1 if any(row.problem for row in rows) else 0
 
 
 def _variant(text: str) -> Variant:

@@ -91,3 +91,10 @@ def test_table_lists_drives_in_order_and_means_over_seeds() -> None:
     text = table([row(2, 3.0), row(1, 1.0)])
     assert text.index("hall, 1") < text.index("hall, 2")
     assert "| hall | plain | 2.00 | 1.00 |" in text
+
+
+def test_table_names_what_failed_and_leaves_it_out_of_the_means() -> None:
+    drive = Simulation("hall", 1, Path("a"), Path("b"))
+    text = table([Row(drive, Variant("never"), {}, "start refused")])
+    assert "| hall, 1 | never | failed: start refused |" in text
+    assert "| hall | never |" not in text
