@@ -70,6 +70,7 @@ struct FrontendConfig {
   double lost_sigma_m = 1.0;
   int min_scan_points = 50;
   int min_matches = 20;
+  double smooth_plane_m = 0.0;
   double shock_accel_m_s2 = 30.0;
   double shock_gyro_rad_s = 5.0;
   double map_memory_m = 20.0;
@@ -214,6 +215,8 @@ struct FrontendConfig {
                  "largest position sigma of a pose that is still of use");
     visit.integer("min_scan_points", self.min_scan_points, {1, 100000}, "points", "fewer: the scan is skipped");
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
+    visit.number("smooth_plane_m", self.smooth_plane_m, {0.0, 1.0}, "m",
+                 "a plane of this roughness counts half as much as a perfect one; 0: all count alike");
     visit.number("shock_accel_m_s2", self.shock_accel_m_s2, {0.0, 1000.0}, "m/s^2",
                  "a sample that differs from gravity by more is a shock, believed as little as a clipped one; 0: none");
     visit.number("shock_gyro_rad_s", self.shock_gyro_rad_s, {0.0, 100.0}, "rad/s",

@@ -109,7 +109,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       const PlaneFit& plane = planes_[i];
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
-      constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), 1.0});
+      constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), smoothness(plane), 1.0});
     }
   }
   leave_out_new_surfaces(map.scans());
@@ -216,8 +216,16 @@ void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
     for (int axis = 0; axis < 3; ++axis) {
       if (std::abs(constraint.plane.normal[axis]) > kTouch) weakest = std::min(weakest, observability[axis]);
     }
-    constraint.weight = full > 0.0 ? std::max(weakest / full, config_.min_observability) : 1.0;
+    const double share = full > 0.0 ? std::max(weakest / full, config_.min_observability) : 1.0;
+    constraint.weight = share * constraint.smoothness;
   }
+}
+
+/// Where an edge or a corner passes for a plane, the fit depends on where the query lies and from where its
+/// surroundings were seen. That is the same in scan after scan, so it does not average out.
+double ScanMatcher::smoothness(const PlaneFit& plane) const {
+  const double limit2 = config_.smooth_plane_m * config_.smooth_plane_m;
+  return limit2 > 0.0 ? limit2 / (limit2 + plane.scatter[0]) : 1.0;
 }
 
 double ScanMatcher::residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Constraint& constraint) {
@@ -235,7 +243,7 @@ double ScanMatcher::point_variance(const Pose& pose) const {
   double squares = 0.0;
   for (const Constraint& constraint : constraints_) {
     const double z = residual(R, pose.translation, constraint);
-    squares += z * z;
+    squares += constraint.smoothness * z * z;
   }
   const double sum = config_.noise_prior_points * config_.measurement_noise + inflation() * squares;
   const double variance = sum / (config_.noise_prior_points + static_cast<double>(constraints_.size()));

@@ -59,7 +59,8 @@ class ScanMatcher {
     Eigen::Vector3d point_body;
     PlaneFit plane;         ///< odom axes
     double plane_distance;  ///< [m] normal . centroid
-    double weight;          ///< observability weight, (0, 1]
+    double smoothness;      ///< of the plane, (0, 1]
+    double weight;          ///< this times the observability weight
   };
   struct Assessment {
     double mean_innovation = 0.0;      ///< [m]
@@ -80,6 +81,8 @@ class ScanMatcher {
   void fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config, double radius);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
+  /// How much a plane counts by its roughness, (0, 1].
+  [[nodiscard]] double smoothness(const PlaneFit& plane) const;
   void weigh(const Eigen::Vector3d& observability);
   /// Distance of a point from its plane [m] at the pose (R, t).
   [[nodiscard]] static double residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t,

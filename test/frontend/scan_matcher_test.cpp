@@ -104,5 +104,37 @@ TEST_F(CorridorEnd, IsTakenForChanceBelowTheShareThatIsAskedFor) {
   EXPECT_EQ(match().salient.constraints.count, 0);
 }
 
+/// Height that a standing sensor is put at over a floor of squares of a metre, every other one of which is rough and
+/// was mapped 3 cm too high.
+double height_over_patches(double smooth_plane_m) {
+  FrontendConfig config = test::tuned_config();
+  config.smooth_plane_m = smooth_plane_m;
+  std::vector<Eigen::Vector3f> mapped;
+  std::vector<Eigen::Vector3f> seen;
+  for (int i = -40; i < 40; ++i) {
+    for (int k = -40; k < 40; ++k) {
+      const auto x = 0.05F * (static_cast<float>(i) + 0.5F);
+      const auto z = 0.05F * (static_cast<float>(k) + 0.5F);
+      const bool rough = (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(z))) % 2 != 0;
+      const bool high = (static_cast<int>(std::floor(x / 0.1F)) + static_cast<int>(std::floor(z / 0.1F))) % 2 != 0;
+      mapped.emplace_back(x, rough ? (high ? -0.95F : -0.99F) : -1.0F, z);
+      seen.emplace_back(x, -1.0F, z);
+    }
+  }
+  LocalMap map(config);
+  for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
+  FilterState predicted;
+  predicted.covariance = 1e-4 * ErrorCovariance::Identity();
+  const MatchResult result = ScanMatcher(config).match(predicted, Pose(), seen, map);
+  EXPECT_TRUE(result.stats.applied());
+  return result.filter.nominal.T_odom_body.translation.y();
+}
+
+TEST(RoughPlanes, CountForLittleWhereThereAreSmoothOnes) {
+  const double all_alike = height_over_patches(0.0);
+  EXPECT_GT(all_alike, 0.005);
+  EXPECT_LT(std::abs(height_over_patches(0.005)), 0.3 * all_alike);
+}
+
 }  // namespace
 }  // namespace ignis
