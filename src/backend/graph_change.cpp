@@ -44,6 +44,7 @@ void transfer(auto& io, FieldsOf<LinkEnd> auto& end) {
 void transfer(auto& io, FieldsOf<GraphNode> auto& node) {
   transfer(io, node.end);
   io.matrix(node.odometry);
+  io.matrix(node.pose_covariance);
   transfer(io, node.link);
 }
 

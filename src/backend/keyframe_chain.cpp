@@ -23,6 +23,13 @@ std::optional<std::string> imu_obstacle(const Keyframe& keyframe, const LinkEnd&
   return imu_problem(keyframe.imu, previous.utime, keyframe.state.utime, noise);
 }
 
+/// Of the pose, attitude then position, both in body axes.
+Matrix6d pose_covariance(const Keyframe& keyframe) {
+  Matrix6d to_body = Matrix6d::Identity();
+  to_body.bottomRightCorner<3, 3>() = keyframe.state.T_odom_body.rotation.conjugate().toRotationMatrix();
+  return to_body * keyframe.covariance.topLeftCorner<6, 6>() * to_body.transpose();
+}
+
 SolverOutcome insert(const KeyframeLink& link, const BackendConfig& config, IncrementalSolver& solver) {
   gtsam::NonlinearFactorGraph factors;
   gtsam::Values values;
@@ -96,7 +103,7 @@ bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state) {
 
 SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
                               SmootherState& state, std::string& left_out) {
-  GraphNode node{{keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body, {}}, {}, {}};
+  GraphNode node{{keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body, {}}, {}, pose_covariance(keyframe), {}};
   SolverOutcome outcome = state.nodes.empty() ? insert_first(keyframe, config, solver, node)
                                               : insert_next(keyframe, config, solver, state, node, left_out);
   if (!outcome.accepted) return outcome;

@@ -20,6 +20,7 @@ std::string keyframe_problem(const Keyframe& keyframe) {
   if (!state.T_odom_body.all_finite()) return "the pose is not finite";
   if (!state.v_odom.allFinite()) return "the velocity is not finite";
   if (!state.gyro_bias.allFinite() || !state.accel_bias.allFinite()) return "a bias is not finite";
+  if (!keyframe.covariance.allFinite()) return "the covariance is not finite";
   if (!keyframe.scan_information.allFinite()) return "the scan information is not finite";
   if (std::abs(state.T_odom_body.rotation.norm() - 1.0) > kUnitTolerance) return "the quaternion is not of unit length";
   if (state.T_odom_body.translation.norm() > kAbsurdPosition) return "the position is absurd";

@@ -2,6 +2,7 @@
 #include "backend/odometry_chain.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "common/so3.h"
@@ -17,14 +18,29 @@ Matrix6d adjoint(const Pose& pose) {
   return result;
 }
 
-void OdometryChain::append(const Pose& T_odom_body, const Matrix6d& step_covariance) {
+Matrix6d larger_of(const Matrix6d& covariance, const Matrix6d& other) {
+  // With covariance = L L^T, both are diagonal in the axes of the eigenvectors of L^-1 other L^-T.
+  const Eigen::LLT<Matrix6d> llt(covariance);
+  const Matrix6d half = llt.matrixL().solve(other);
+  const Matrix6d relative = llt.matrixL().solve(half.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (relative + relative.transpose()));
+  if (eigen.eigenvalues()(5) <= 1.0) return covariance;
+  const Matrix6d axes = llt.matrixL() * eigen.eigenvectors();
+  return axes * eigen.eigenvalues().cwiseMax(1.0).asDiagonal() * axes.transpose();
+}
+
+void OdometryChain::append(const Pose& T_odom_body, const Matrix6d& step_covariance, const Matrix6d& pose_covariance) {
+  const Matrix6d to_odom = adjoint(T_odom_body);
+  const Matrix6d pose_in_odom = to_odom * pose_covariance * to_odom.transpose();
   Matrix6d sum = Matrix6d::Zero();
   if (!poses_.empty()) {
-    const Matrix6d to_odom = adjoint(T_odom_body);
-    sum = sums_.back() + to_odom * step_covariance * to_odom.transpose();
+    const Matrix6d to_body = adjoint(T_odom_body.inverse());
+    const Matrix6d growth = to_body * (pose_in_odom - newest_) * to_body.transpose();
+    sum = sums_.back() + to_odom * larger_of(step_covariance, growth) * to_odom.transpose();
   }
   poses_.push_back(T_odom_body);
   sums_.push_back(sum);
+  newest_ = pose_in_odom;
 }
 
 Pose OdometryChain::T_from_to(std::size_t from, std::size_t to) const { return poses_[from].inverse() * poses_[to]; }

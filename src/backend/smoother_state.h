@@ -19,6 +19,7 @@ namespace ignis {
 struct GraphNode {
   LinkEnd end;
   WhiteningRows odometry;  ///< of the link to the previous node, for the exported graph
+  Matrix6d pose_covariance = Matrix6d::Zero();  ///< the front end's, of T_odom_body; attitude then position, body axes
   KeyframeLink link;       ///< what its factors are made of
 };
 

@@ -17,7 +17,7 @@ OdometryChain straight(std::size_t count, double sigma_m) {
   for (std::size_t i = 0; i < count; ++i) {
     Pose pose;
     pose.translation.z() = -static_cast<double>(i);
-    chain.append(pose, variance.asDiagonal());
+    chain.append(pose, variance.asDiagonal(), Matrix6d::Zero());
   }
   return chain;
 }
@@ -68,14 +68,14 @@ TEST(LoopConsistency, IsChiSquareDistributedForTrueLoops) {
     OdometryChain chain;
     std::vector<Pose> truth(1);
     Pose odometry;
-    chain.append(odometry, step);
+    chain.append(odometry, step, Matrix6d::Zero());
     for (int i = 1; i < 40; ++i) {
       Vector6d motion;
       motion << 0.0, 0.2, 0.01, 0.1, 0.0, -1.0;
       const Pose T_previous_this = perturbed_in_body(Pose(), motion);
       truth.push_back(truth.back() * T_previous_this);
       odometry = odometry * perturbed_in_body(T_previous_this, noise(kStep, 0.1));
-      chain.append(odometry, step);
+      chain.append(odometry, step, Matrix6d::Zero());
     }
     const auto measured = [&](std::size_t from, std::size_t to) {
       return LoopClaim{from, to, perturbed_in_body(truth[to].inverse() * truth[from], noise(kLoop, 1.0)), of_loop, 6};

@@ -44,9 +44,10 @@ TEST(LoopDetector, GatesTheIndexGap) {
 struct Space {
   explicit Space(std::vector<KeyframePose> keyframes, const Matrix6d& step_covariance = Matrix6d::Zero())
       : poses(std::move(keyframes)) {
+    const Matrix6d definite = step_covariance + 1e-18 * Matrix6d::Identity();
     for (std::size_t i = 0; i < poses.size(); ++i) {
       places.place(i, poses[i].T_map_body.translation);
-      odometry.append(poses[i].T_map_body, step_covariance);
+      odometry.append(poses[i].T_map_body, definite, Matrix6d::Zero());
     }
   }
   [[nodiscard]] std::vector<std::size_t> candidates(double sigmas, double most_m) const {

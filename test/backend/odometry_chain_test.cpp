@@ -33,7 +33,7 @@ struct Walk {
       noise.push_back(random_covariance(random));
       pose = pose * steps.back();
       poses.push_back(pose);
-      chain.append(pose, noise.back());
+      chain.append(pose, noise.back(), Matrix6d::Zero());
     }
   }
   std::vector<Pose> steps;
@@ -82,6 +82,53 @@ TEST(OdometryChain, IsTheSpreadOfManyDrives) {
   }
   const Matrix6d predicted = walk.chain.covariance(2, 11);
   EXPECT_LT((spread - predicted).norm(), 0.08 * predicted.norm());
+}
+
+double smallest_eigenvalue(const Matrix6d& symmetric) {
+  return Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()(0);
+}
+
+TEST(OdometryChain, TheLargerOfTwoCovariancesCoversBoth) {
+  std::mt19937 random(8);
+  for (int i = 0; i < 50; ++i) {
+    const Matrix6d a = random_covariance(random);
+    const Matrix6d b = random_covariance(random);
+    const Matrix6d larger = larger_of(a, b);
+    EXPECT_GT(smallest_eigenvalue(larger - a), -1e-12);
+    EXPECT_GT(smallest_eigenvalue(larger - b), -1e-12);
+    EXPECT_LT((larger - larger_of(b, a)).norm(), 1e-9 * larger.norm());
+    EXPECT_EQ(larger_of(a, 0.5 * a), a);
+    EXPECT_EQ(larger_of(a, -b), a);
+  }
+}
+
+TEST(OdometryChain, NoStepIsSurerThanTheFiltersCovarianceHasGrown) {
+  // Dead reckoning along x with a velocity that is off by 0.1 m/s: each step says 1 cm, together they are 2 m off.
+  OdometryChain chain;
+  const Matrix6d step = 1e-4 * Matrix6d::Identity();
+  for (int i = 0; i <= 20; ++i) {
+    Matrix6d filter = Matrix6d::Zero();
+    filter(3, 3) = 0.01 * i * i;
+    chain.append({Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0 * i}}, step, filter);
+  }
+  const Matrix6d covariance = chain.covariance(0, 20);
+  EXPECT_NEAR(covariance(3, 3), 4.0, 1e-9);
+  EXPECT_NEAR(covariance(4, 4), chain.covariance(20, 0)(4, 4), 1e-9);
+  EXPECT_NEAR(covariance(5, 5), 20e-4, 1e-9);
+}
+
+TEST(OdometryChain, AnErrorThatTurnsTheWholeDriveIsNoGrowth) {
+  // The start's heading is off by 0.1 rad, and with it every place by so much times its distance.
+  Matrix6d start = Matrix6d::Zero();
+  start(1, 1) = 0.01;
+  OdometryChain chain;
+  const Matrix6d step = 1e-6 * Matrix6d::Identity();
+  for (int i = 0; i <= 20; ++i) {
+    const Pose T_odom_body{Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d::UnitY())), {0.0, 0.0, -5.0 * i}};
+    const Matrix6d to_body = adjoint(T_odom_body.inverse());
+    chain.append(T_odom_body, step, to_body * start * to_body.transpose());
+  }
+  EXPECT_NEAR(chain.covariance(19, 20)(3, 3), 1e-6, 1e-9);
 }
 
 TEST(OdometryChain, KnowsLittleWhereTheRowsAreSilent) {

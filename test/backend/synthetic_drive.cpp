@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "backend/odometry_chain.h"
 #include "common/so3.h"
 
 namespace ignis::testing {
@@ -100,8 +101,26 @@ std::vector<CloudPoint> hall_cloud(const Pose& T_world_body, int points, unsigne
   return cloud;
 }
 
+/// Of the last pose of a chain of independent steps, as a front end states it: attitude in body, position in odom axes.
+void follow_step(Matrix15d& covariance, const Pose& T_previous_this, const Pose& T_odom_body, const DriveOptions& o) {
+  const auto rotated = [](const Eigen::Quaterniond& rotation) {
+    Matrix6d to_axes = Matrix6d::Identity();
+    to_axes.bottomRightCorner<3, 3>() = rotation.toRotationMatrix();
+    return to_axes;
+  };
+  const Eigen::Quaterniond R_odom_previous = T_odom_body.rotation * T_previous_this.rotation.conjugate();
+  const Matrix6d step = rotated(T_odom_body.rotation) * adjoint(T_previous_this.inverse()) *
+                        rotated(R_odom_previous.conjugate());
+  Vector6d noise;
+  noise << Eigen::Vector3d::Constant(o.odometry_sigma_rad), Eigen::Vector3d::Constant(o.odometry_sigma_m);
+  const Matrix6d pose = step * covariance.topLeftCorner<6, 6>() * step.transpose();
+  covariance.topLeftCorner<6, 6>() = pose + Matrix6d(noise.cwiseAbs2().asDiagonal());
+}
+
 Drive make_drive(const DriveOptions& o) {
   std::mt19937 random(o.seed);
+  Matrix15d covariance = 1e-4 * Matrix15d::Identity();
+  covariance.topLeftCorner<6, 6>().setZero();
   const Eigen::Vector3d gyro(0.0, o.turn_rate, 0.0);
   const Eigen::Vector3d accel(-o.speed * o.turn_rate, kGravity, 0.0);
   Drive drive;
@@ -113,17 +132,18 @@ Drive make_drive(const DriveOptions& o) {
     keyframe.id = i;
     keyframe.state.utime = 1'000'000 + to_micros(t);
     keyframe.previous_utime = keyframe.state.utime;
-    keyframe.covariance = 1e-4 * Matrix15d::Identity();
     if (i > 0) {
       Vector6d noise;
       noise << gaussian(random, o.odometry_sigma_rad), gaussian(random, o.odometry_sigma_m);
       const Pose T_previous_this =
           drive.T_world_body[static_cast<std::size_t>(i) - 1].inverse() * drive.T_world_body.back();
       T_odom_body = T_odom_body * perturbed_in_body(T_previous_this, noise);
+      follow_step(covariance, T_previous_this, T_odom_body, o);
       keyframe.previous_utime = drive.keyframes.back().state.utime;
       keyframe.imu = imu_between(gyro, accel, keyframe.previous_utime, keyframe.state.utime, o, random);
       keyframe.scan_information = information(o);
     }
+    keyframe.covariance = covariance;
     keyframe.state.T_odom_body = T_odom_body;
     const Pose T_odom_world = T_odom_body * drive.T_world_body.back().inverse();
     keyframe.state.v_odom = T_odom_world.rotation * true_velocity(o, t);
