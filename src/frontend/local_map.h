@@ -152,7 +152,7 @@ class LocalMap {
   double match_radius_;
   double window_;
   double window_y_;
-  double memory_;
+  double memory_;  ///< [m] like window_, for points of whose place the map is sure; never less
   float average_points_;
   std::vector<Block> blocks_;
   std::vector<Region> regions_;
