@@ -117,6 +117,23 @@ TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
   EXPECT_NEAR(scan.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005) << "s";
 }
 
+TEST(Fault_F3, AScanThatIsRefusedSaysNothingOfTheVelocityThatTheMapWasMadeWith) {
+  Drive input = drive();
+  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
+    sample->accel.x() = 25.0;
+    sample->saturated = true;
+  }
+  for (ScanPoint& point : input.scans[160].points) point.position *= 0.3F;
+  const Watched run(input);
+  ASSERT_EQ(run.scans[160].stats.reason, ScanReason::kTooFewMatches) << "in the middle of the hall there is nothing";
+  const ScanResult& next = run.scans[161];
+  ASSERT_TRUE(next.stats.applied());
+  const double velocity_variance = next.covariance(kVelocity, kVelocity);
+  ASSERT_GT(velocity_variance, 1.0) << "m^2/s^2: the clipped axis has cost it";
+  EXPECT_NEAR(next.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005)
+      << "s; as if the map had been made with the velocity of the scan that it did not take";
+}
+
 /// Half a sine of 20 ms, 8 s after the beginning, with these peaks [m/s^2, rad/s]: 60 are 0.8 m/s, 8 are 0.1 rad.
 Watched struck(double accel, double gyro) {
   Drive input = drive();
