@@ -117,16 +117,37 @@ TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
   EXPECT_NEAR(scan.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005) << "s";
 }
 
-TEST(Fault_F3, AScanThatIsRefusedSaysNothingOfTheVelocityThatTheMapWasMadeWith) {
+constexpr std::size_t kWhileClipped = 160;  // scan
+
+Drive clipped_drive() {
   Drive input = drive();
   for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
     sample->accel.x() = 25.0;
     sample->saturated = true;
   }
-  for (ScanPoint& point : input.scans[160].points) point.position *= 0.3F;
+  return input;
+}
+
+TEST(Fault_F3, AScanThatIsRefusedLeavesNoDriftInTheMap) {
+  Drive input = clipped_drive();
+  for (ScanPoint& point : input.scans[kWhileClipped].points) point.position *= 0.3F;
+  const Watched refused(input);
+  ASSERT_FALSE(refused.scans[kWhileClipped].stats.applied());
+  input.scans.erase(input.scans.begin() + kWhileClipped);
+  const Watched absent(input);
+  const auto variance = [](const Watched& run) {
+    return run.scans.back().covariance.block<3, 3>(kPosition, kPosition).trace();
+  };
+  EXPECT_NEAR(variance(refused) / variance(absent), 1.0, 0.1);
+}
+
+TEST(Fault_F3, AScanThatIsRefusedSaysNothingOfTheVelocityThatTheMapWasMadeWith) {
+  Drive input = clipped_drive();
+  for (ScanPoint& point : input.scans[kWhileClipped].points) point.position *= 0.3F;
   const Watched run(input);
-  ASSERT_EQ(run.scans[160].stats.reason, ScanReason::kTooFewMatches) << "in the middle of the hall there is nothing";
-  const ScanResult& next = run.scans[161];
+  ASSERT_EQ(run.scans[kWhileClipped].stats.reason, ScanReason::kTooFewMatches)
+      << "in the middle of the hall there is nothing";
+  const ScanResult& next = run.scans[kWhileClipped + 1];
   ASSERT_TRUE(next.stats.applied());
   const double velocity_variance = next.covariance(kVelocity, kVelocity);
   ASSERT_GT(velocity_variance, 1.0) << "m^2/s^2: the clipped axis has cost it";
