@@ -8,9 +8,11 @@
 //     ninja -C build/release benchmarks && build/release/bin/smoother_benchmark
 
 #include <benchmark/benchmark.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "backend/smoother.h"
@@ -50,6 +52,11 @@ std::vector<CloudPoint> cloud_of(std::int64_t points) {
   return cloud;
 }
 
+/// Of this process alone: two that run at once would remove each other's journal.
+std::filesystem::path journal_folder() {
+  return std::filesystem::temp_directory_path() / ("ignis_smoother_benchmark_" + std::to_string(getpid()));
+}
+
 /// Arguments: keyframes, keyframes from one loop to the next, points of a cloud.
 void drive(benchmark::State& state) {
   const auto count = static_cast<int>(state.range(0));
@@ -59,7 +66,7 @@ void drive(benchmark::State& state) {
   BackendConfig config;
   config.use_loop_closing = false;  // the search is another matter; loops are handed in
   for (auto _ : state) {
-    const std::filesystem::path folder = std::filesystem::temp_directory_path() / "ignis_smoother_benchmark";
+    const std::filesystem::path folder = journal_folder();
     std::filesystem::remove_all(folder);
     JournalFile journal(folder);
     journal.begin({kJournalVersion, "benchmark", 0});

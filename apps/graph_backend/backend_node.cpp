@@ -207,6 +207,7 @@ void BackendNode::request_missing_keyframes() {
 void BackendNode::publish_health() {
   keyframe_counts_->queue_drops = assembler_.incomplete();
   const SmootherStats stats = graph_.smoother().stats();
+  const bool cloud_was_lost = cloud_losses_.look(stats.clouds_unreadable, std::chrono::steady_clock::now());
   if (!stats.solver_failure.empty()) {
     link_.report_health(
         newest_utime_, health_t::FAULT,
@@ -220,9 +221,9 @@ void BackendNode::publish_health() {
     link_.report_health(newest_utime_, health_t::DEGRADED,
                         std::format("waiting for keyframe {}", graph_.smoother().expected_id()));
   } else if (stats.clouds_unreadable > 0) {
-    link_.report_health(newest_utime_, health_t::DEGRADED,
-                        std::format("{} times the journal did not give a cloud back, and a loop was refused for it",
-                                    stats.clouds_unreadable));
+    link_.report_health(newest_utime_, cloud_was_lost ? health_t::DEGRADED : health_t::OK,
+                        std::format("{}{} times the journal did not give a cloud back, and a loop was refused for it",
+                                    cloud_was_lost ? "" : "OK: ", stats.clouds_unreadable));
   } else if (stats.clouds_forgotten > 0) {
     link_.report_health(newest_utime_, health_t::OK,
                         std::format("OK: without a journal {} clouds beyond backend.cloud_memory_mb were dropped; "

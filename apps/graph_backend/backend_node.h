@@ -13,6 +13,7 @@
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
 #include "runtime/lcm_link.h"
+#include "runtime/recent_rise.h"
 
 namespace ignis {
 
@@ -58,6 +59,7 @@ class BackendNode {
   Utime last_smoothed_utime_ = 0;
   std::chrono::steady_clock::time_point last_full_{};
   SmootherUpdate last_update_;
+  runtime::RecentRise cloud_losses_{std::chrono::seconds(60)};
   std::string refusal_;  // of the newest keyframe; empty when it was accepted
   std::int32_t revision_sequence_ = 0;
   std::int32_t loop_sequence_ = 0;

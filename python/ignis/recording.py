@@ -22,6 +22,7 @@ from ignis.pipeline import program
 
 _STOP_S = 10.0
 _LEAST_LIFE_S = 2.0  # of a logger that is worth starting again
+_HEALTH_PERIOD_S = 1.0
 _ROOM_AGAIN = 1.2  # of --keep-free-mb
 _DEFAULT_CONFIG = Path("config") / "ignis8_tuned.json"
 
@@ -31,7 +32,7 @@ class Recording:
 
     A new file begins when the logger was killed, and when a disk that was nearly full has room again: what was written
     is left as it is. While the disk is too full HEALTH says FAULT; a logger that was killed is succeeded at
-    once, a successor that ended at once after two seconds.
+    once, a successor that ended at once after two seconds. HEALTH says OK once a successor has lived that long.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -49,6 +50,8 @@ class Recording:
         self._finished: list[Path] = []
         self._number = 0
         self._health_sequence = 0
+        self._told: tuple[int, str] | None = None
+        self._told_at = 0.0
         self._bus = self._open_bus()
         self._start_logger()
 
@@ -140,9 +143,9 @@ class Recording:
             if free < _ROOM_AGAIN * keep:
                 self._tell(health_t.FAULT, f"recording paused: the disk has less than {keep:.0f} MB left")
                 return None
-            self._tell(health_t.OK, "recording goes on")
             self._begin_next_file()
             self.paused = False
+            self._tell_that_it_goes_on()
             return f"the disk has room again; recording goes on in {self.file(0)}"
         if free < keep:
             self._tell(health_t.FAULT, f"recording paused: the disk has less than {keep:.0f} MB left")
@@ -153,6 +156,7 @@ class Recording:
             self.interruptions.append(f"the disk has less than {keep:.0f} MB left")
             return f"{self.interruptions[-1]}: paused until there is room"
         if (code := self.logger.poll()) is None:
+            self._tell_of_the_successor()
             return None
         if self.interruptions and time.monotonic() - self._started < _LEAST_LIFE_S:
             # A successor that ended at once is followed too, but not in a rush.
@@ -168,7 +172,6 @@ class Recording:
             raise InputError(f"lcm-logger ended with code {code}: {(said or ['no message'])[-1]}")
         self.interruptions.append(f"lcm-logger ended with code {code}")
         self._begin_next_file()
-        self._tell(health_t.OK, "recording goes on")
         return f"{self.interruptions[-1]}; recording goes on in {self.file(0)}"
 
     def _begin_next_file(self) -> None:
@@ -184,8 +187,25 @@ class Recording:
         self.tail.follow(self.file(0))
         self._start_logger()
 
+    def _tell_of_the_successor(self) -> None:
+        """One that ends at once again is no recovery: HEALTH would go to and fro between OK and FAULT."""
+        if self.interruptions and time.monotonic() - self._started >= _LEAST_LIFE_S:
+            self._tell_that_it_goes_on()
+        elif self._told is not None:
+            self._tell(*self._told)
+
+    def _tell_that_it_goes_on(self) -> None:
+        self._tell(health_t.OK, f"recording goes on in {self.file(0).name}")
+
     def _tell(self, state: int, text: str) -> None:
-        """What the status page shows of the recording; in good times nothing, since it would be recorded as well."""
+        """What the status page shows of the recording; in good times nothing, since it would be recorded as well.
+
+        Once there was something to say it is said every second: who has spoken and is silent counts as gone.
+        """
+        now = time.monotonic()
+        if (state, text) == self._told and now - self._told_at < _HEALTH_PERIOD_S:
+            return
+        self._told, self._told_at = (state, text), now
         message = health_t()
         message.process, message.pid, message.state, message.state_text = "ignis_record", os.getpid(), state, text
         message.sequence = self._health_sequence

@@ -62,12 +62,13 @@ def newest_health(listener: Listener) -> list[tuple[float, Any]]:
 
 
 def disagreements(listener: Listener) -> list[str]:
-    """What the living processes do not agree about."""
+    """What the living processes do not agree about. Tools, such as the recorder, say neither."""
     alive = [message for age, message in newest_health(listener) if age < _GONE_AFTER_S]
     lines = []
     for what, name in (("config_hash", "configuration"), ("version", "version")):
-        if len({getattr(message, what) for message in alive}) > 1:
-            each = ", ".join(f"{message.process} {getattr(message, what)}" for message in alive)
+        said = [message for message in alive if getattr(message, what)]
+        if len({getattr(message, what) for message in said}) > 1:
+            each = ", ".join(f"{message.process} {getattr(message, what)}" for message in said)
             lines.append(f"ERROR: processes disagree about the {name}: {each}")
     return lines
 

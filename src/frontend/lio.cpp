@@ -337,11 +337,11 @@ void Lio::follow_moving_start(ScanReason reason) {
 /// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.
 void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match) {
   if (trust_.awaits_confirmation()) return;
-  const bool applied = match.stats.applied();
-  if (applied && match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
-  if (applied)
+  if (match.stats.applied()) {
+    if (match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
     drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body, match.map_age_scans,
                     blind_shifts(match.degeneracy));
+  }
   grow_map(cloud, match);
 }
 

@@ -18,7 +18,6 @@ using cubes::voxel_of;
 
 constexpr std::int32_t kFree = -1;
 constexpr std::size_t kFirstCapacity = 256;
-constexpr std::size_t kSlidesToSweep = 16;  // so that no scan has to wait for the whole map to be looked through
 
 }  // namespace
 

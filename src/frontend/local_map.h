@@ -46,10 +46,13 @@ class LocalMap {
   /// The confirmed point nearest a point, within a radius [m]. Costs what gather costs: for rare use.
   [[nodiscard]] std::optional<Eigen::Vector3d> nearest(const Eigen::Vector3d& query, double radius) const;
 
+  /// Calls of slide() that it takes to look through the map, so that no scan has to wait for all of it.
+  static constexpr int kSlidesToSweep = 16;
+
   /// Once the vehicle has moved a quarter of the window since the last time, drops what left it, in the course of this
-  /// and the next calls: call it after each scan. What lies farther than map_window_m and is of scans before number
-  /// `sure_since` goes as well: it is no longer where the map says, and a vehicle that comes back would be matched with
-  /// both.
+  /// and the next kSlidesToSweep - 1 calls: call it after each scan. What lies farther than map_window_m and is of
+  /// scans before number `sure_since` goes as well: it is no longer where the map says, and a vehicle that comes back
+  /// would be matched with both.
   void slide(const Eigen::Vector3d& position, int sure_since);
 
   void clear();
@@ -152,7 +155,7 @@ class LocalMap {
   double match_radius_;
   double window_;
   double window_y_;
-  double memory_;
+  double memory_;  ///< [m] like window_, for points of whose place the map is sure; never less
   float average_points_;
   std::vector<Block> blocks_;
   std::vector<Region> regions_;

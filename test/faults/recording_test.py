@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ignis_lcm.ignis import health_t
@@ -55,7 +56,9 @@ class Recorder:
         self.process = subprocess.Popen(
             list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-        self.listener = Listener(BUS, "HEALTH")
+        self.states: list[int] = []  # that its HEALTH went through
+        self.heard = 0  # HEALTH messages of it
+        self.listener = Listener(BUS, "HEALTH", self._note_state)
         self.sent = 0
         self.started = False
 
@@ -66,6 +69,13 @@ class Recorder:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
             self.process.communicate(timeout=20)
+
+    def _note_state(self, _: str, message: Any) -> None:
+        if message.process != "ignis_record":
+            return
+        self.heard += 1
+        if message.state not in self.states[-1:]:
+            self.states.append(message.state)
 
     def send_until(self, holds: Callable[[], bool], seconds: float = 30.0) -> float:
         """Publishes numbered messages until it holds; how long that took [s]."""
@@ -153,8 +163,25 @@ def test_fault_p6_a_successor_that_is_killed_as_soon_as_it_began_is_succeeded_as
         recorder.send_until(lambda: recorder.says(health_t.FAULT))
         took = recorder.send_until(third.exists)
         recorder.send_until(lambda: third.stat().st_size > 1_500_000)
-        assert recorder.says(health_t.OK)
+        recorder.send_until(lambda: recorder.says(health_t.OK))
         code, said = recorder.end()
     assert took < 3.0 + BUSY_S
     assert code == 3 and said.count("lcm-logger ended with code -9") >= 2
     assert recorded_config(third) is not None and len(numbers(third)) > 10
+
+
+def test_fault_p6_loggers_that_end_at_once_are_one_fault_until_one_goes_on(
+    private_network: None, tmp_path: Path
+) -> None:
+    logs = [tmp_path / f"drive{part}.lcmlog" for part in ("", "-2", "-3", "-4", "-5")]
+    with Recorder(logs[0]) as recorder:
+        recorder.send_until(lambda: logs[0].exists() and recorder.sent > 250)
+        for log in logs[:-1]:
+            recorder.send_until(log.exists)
+            recorder.kill_logger()
+        recorder.send_until(lambda: recorder.says(health_t.OK))
+        assert recorder.states == [health_t.FAULT, health_t.OK]
+        told = recorder.heard
+        recorder.send_until(lambda: recorder.heard >= told + 3, seconds=3.0 + BUSY_S)
+        code, _ = recorder.end()
+    assert code == 3 and len(numbers(logs[-1])) > 10

@@ -117,24 +117,78 @@ TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
   EXPECT_NEAR(scan.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005) << "s";
 }
 
-TEST(Fault_F3, AShockCostsNeitherThePlaceNorTheSession) {
+constexpr std::size_t kWhileClipped = 160;  // scan
+
+Drive clipped_drive() {
+  Drive input = drive();
+  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
+    sample->accel.x() = 25.0;
+    sample->saturated = true;
+  }
+  return input;
+}
+
+TEST(Fault_F3, AScanThatIsRefusedLeavesNoDriftInTheMap) {
+  Drive input = clipped_drive();
+  for (ScanPoint& point : input.scans[kWhileClipped].points) point.position *= 0.3F;
+  const Watched refused(input);
+  ASSERT_FALSE(refused.scans[kWhileClipped].stats.applied());
+  input.scans.erase(input.scans.begin() + kWhileClipped);
+  const Watched absent(input);
+  const auto variance = [](const Watched& run) {
+    return run.scans.back().covariance.block<3, 3>(kPosition, kPosition).trace();
+  };
+  EXPECT_NEAR(variance(refused) / variance(absent), 1.0, 0.1);
+}
+
+TEST(Fault_F3, AScanThatIsRefusedSaysNothingOfTheVelocityThatTheMapWasMadeWith) {
+  Drive input = clipped_drive();
+  for (ScanPoint& point : input.scans[kWhileClipped].points) point.position *= 0.3F;
+  const Watched run(input);
+  ASSERT_EQ(run.scans[kWhileClipped].stats.reason, ScanReason::kTooFewMatches)
+      << "in the middle of the hall there is nothing";
+  const ScanResult& next = run.scans[kWhileClipped + 1];
+  ASSERT_TRUE(next.stats.applied());
+  const double velocity_variance = next.covariance(kVelocity, kVelocity);
+  ASSERT_GT(velocity_variance, 1.0) << "m^2/s^2: the clipped axis has cost it";
+  EXPECT_NEAR(next.covariance(kPosition, kVelocity) / velocity_variance, 0.025, 0.005)
+      << "s; as if the map had been made with the velocity of the scan that it did not take";
+}
+
+/// Half a sine of 20 ms, 8 s after the beginning, with these peaks [m/s^2, rad/s]: 60 are 0.8 m/s, 8 are 0.1 rad.
+Watched struck(double accel, double gyro) {
   Drive input = drive();
   const auto begin = sample_at(input, 8.0);
-  for (auto sample = begin; sample != sample_at(input, 8.02); ++sample) {  // half a sine of 60 m/s^2: 0.8 m/s
+  for (auto sample = begin; sample != sample_at(input, 8.02); ++sample) {
     const double phase = 1e-6 * static_cast<double>(sample->utime - begin->utime) / 0.02;
-    sample->accel.x() += 60.0 * std::sin(std::numbers::pi * phase);
-    sample->gyro.y() += 8.0 * std::sin(std::numbers::pi * phase);
+    sample->accel.x() += accel * std::sin(std::numbers::pi * phase);
+    sample->gyro.y() += gyro * std::sin(std::numbers::pi * phase);
   }
-  const Watched run(input);
+  return Watched(input);
+}
+
+void expect_harmless(const Watched& run) {
   int refused = 0;
   for (const ScanResult& scan : run.scans) {
     EXPECT_EQ(scan.stats.session, run.scans.front().stats.session);
-    refused += scan.stats.utime > begin->utime && !scan.stats.applied() ? 1 : 0;
+    refused += test::drive_seconds(drive(), scan.stats.utime) > 8.0 && !scan.stats.applied() ? 1 : 0;
   }
   EXPECT_LE(refused, 2);
   for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
   EXPECT_LT(run.error_at_end(), 0.3);
+  const auto after = [&](double seconds) {
+    const Utime utime = drive().imu.front().utime + to_micros(seconds);
+    return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
+  };
+  EXPECT_EQ((after(8.95).accel_bias - after(8.05).accel_bias).norm(), 0.0);
+  EXPECT_EQ((after(8.95).gyro_bias - after(8.05).gyro_bias).norm(), 0.0);
 }
+
+TEST(Fault_F3, AShockCostsNeitherThePlaceNorTheSession) { expect_harmless(struck(60.0, 8.0)); }
+
+TEST(Fault_F3, AShockThatOnlyTheAccelerometerFeelsCostsNothingEither) { expect_harmless(struck(60.0, 0.0)); }
+
+TEST(Fault_F3, AShockThatOnlyTheGyroFeelsCostsNothingEither) { expect_harmless(struck(0.0, 8.0)); }
 
 TEST(Fault_F3, StandingAfterAClippedSampleTeachesTheBiasesNothingEither) {
   Drive input = test::simulate(test::furnished_hall(), test::straight_drive(20.0, 0.5), 12.0, Sensors{}, 3);

@@ -268,7 +268,7 @@ TEST(LocalMap, UnconfirmedPointsNeverReplaceConfirmedOnes) {
 
 /// What the scans of a vehicle that stays there do.
 void slide_at(LocalMap& map, const Eigen::Vector3d& position, int sure_since) {
-  for (int i = 0; i < 20; ++i) map.slide(position, sure_since);
+  for (int i = 0; i < LocalMap::kSlidesToSweep; ++i) map.slide(position, sure_since);
 }
 
 TEST(LocalMap, SlidesOnlyAfterAQuarterOfTheWindow) {

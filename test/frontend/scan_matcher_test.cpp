@@ -104,11 +104,17 @@ TEST_F(CorridorEnd, IsTakenForChanceBelowTheShareThatIsAskedFor) {
   EXPECT_EQ(match().salient.constraints.count, 0);
 }
 
-/// Height that a standing sensor is put at over a floor of squares of a metre, every other one of which is rough and
-/// was mapped 3 cm too high.
-double height_over_patches(double smooth_plane_m) {
+/// A floor of squares of a metre, every other one of which is rough and was mapped too high.
+struct Patches {
+  double smooth_plane_m = 0.005;
+  float too_high = 0.03F;  ///< [m]
+  float noise = 0.0F;      ///< [m] of the points that are matched with it, up and down in turn
+};
+
+/// What a standing sensor a metre above it makes of it.
+MatchResult match_over(const Patches& patches) {
   FrontendConfig config = test::tuned_config();
-  config.smooth_plane_m = smooth_plane_m;
+  config.smooth_plane_m = patches.smooth_plane_m;
   std::vector<Eigen::Vector3f> mapped;
   std::vector<Eigen::Vector3f> seen;
   for (int i = -40; i < 40; ++i) {
@@ -117,23 +123,31 @@ double height_over_patches(double smooth_plane_m) {
       const auto z = 0.05F * (static_cast<float>(k) + 0.5F);
       const bool rough = (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(z))) % 2 != 0;
       const bool high = (static_cast<int>(std::floor(x / 0.1F)) + static_cast<int>(std::floor(z / 0.1F))) % 2 != 0;
-      mapped.emplace_back(x, rough ? (high ? -0.95F : -0.99F) : -1.0F, z);
-      seen.emplace_back(x, -1.0F, z);
+      mapped.emplace_back(x, rough ? patches.too_high + (high ? -0.98F : -1.02F) : -1.0F, z);
+      seen.emplace_back(x, -1.0F + ((i + k) % 2 != 0 ? patches.noise : -patches.noise), z);
     }
   }
   LocalMap map(config);
   for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
   FilterState predicted;
   predicted.covariance = 1e-4 * ErrorCovariance::Identity();
-  const MatchResult result = ScanMatcher(config).match(predicted, Pose(), seen, map);
+  MatchResult result = ScanMatcher(config).match(predicted, Pose(), seen, map);
   EXPECT_TRUE(result.stats.applied());
-  return result.filter.nominal.T_odom_body.translation.y();
+  return result;
 }
 
 TEST(RoughPlanes, CountForLittleWhereThereAreSmoothOnes) {
-  const double all_alike = height_over_patches(0.0);
+  const auto height = [](const MatchResult& result) { return result.filter.nominal.T_odom_body.translation.y(); };
+  const double all_alike = height(match_over({.smooth_plane_m = 0.0}));
   EXPECT_GT(all_alike, 0.005);
-  EXPECT_LT(std::abs(height_over_patches(0.005)), 0.3 * all_alike);
+  EXPECT_LT(std::abs(height(match_over({}))), 0.3 * all_alike);
+}
+
+TEST(RoughPlanes, DoNotMakeTheSmoothOnesPassForNoisy) {
+  const auto information = [](const MatchResult& result) { return result.information_body(4, 4); };  // on the height
+  const double where_they_fit = information(match_over({.too_high = 0.0F, .noise = 0.02F}));
+  const double where_they_do_not = information(match_over({.too_high = 0.03F, .noise = 0.02F}));
+  EXPECT_GT(where_they_do_not, 0.7 * where_they_fit);
 }
 
 }  // namespace

@@ -94,6 +94,8 @@ def test_status_counts_a_disagreement_and_a_missing_process_as_not_well(private_
     for pid, name in enumerate(VICTIMS):
         listener.health[(name, pid)] = (now, health(name, pid))
     assert all_well(listener) and disagreements(listener) == []
+    listener.health[("ignis_record", 9)] = (now, health("ignis_record", 9, config_hash="", version=""))
+    assert all_well(listener), "a tool that names no configuration contradicts nobody"
     listener.health[("map_builder", 3)] = (now, health("map_builder", 3, config_hash="bb"))
     assert not all_well(listener) and "map_builder bb" in disagreements(listener)[0]
     listener.health[("map_builder", 3)] = (now - 5.0, health("map_builder", 3))
