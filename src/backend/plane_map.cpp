@@ -93,8 +93,7 @@ std::optional<std::size_t> PlaneMap::nearest_voxel(const Eigen::Vector3d& point,
 void PlaneMap::fit(std::size_t voxel) {
   const auto moments_within = [&](int reach) {
     Moments sum;
-    index_.for_each_around(contents_[voxel].cell, reach,
-                           [&](std::uint32_t there) { sum += contents_[there].moments; });
+    index_.for_each_around(contents_[voxel].cell, reach, [&](std::uint32_t there) { sum += contents_[there].moments; });
     return sum;
   };
   voxels_[voxel].fit = Fit::kNoPlane;

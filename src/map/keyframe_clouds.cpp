@@ -28,8 +28,8 @@ std::optional<CloudPoint> sound(const Eigen::Vector3d& p, float intensity) {
 
 /// The blocks that the points of a cloud lie in, numbered in the order of their keys.
 struct BlockNumbers {
-  std::vector<CellKey> keys;           ///< [block] ascending
-  std::vector<std::uint32_t> sizes;    ///< [block] points
+  std::vector<CellKey> keys;            ///< [block] ascending
+  std::vector<std::uint32_t> sizes;     ///< [block] points
   std::vector<std::uint32_t> of_point;  ///< [point] block
 };
 
@@ -118,8 +118,7 @@ std::span<const CloudPoint> KeyframeClouds::insert_open(std::span<const CloudPoi
     // The sensor stands near the body's origin; the few centimetres between are less than a cell.
     if (open_free_ && are_rays) open_free_->add_ray(T_keyframe_points.translation, p);
     if (open_free_ && !are_rays) open_free_->add_hit(p);
-    if (open_points_.size() < max_points_ && open_cells_.insert(cell_of(p, per_metre)))
-      open_points_.push_back(*kept);
+    if (open_points_.size() < max_points_ && open_cells_.insert(cell_of(p, per_metre))) open_points_.push_back(*kept);
   }
   return std::span(open_points_).subspan(before);
 }
@@ -177,9 +176,9 @@ void KeyframeClouds::clear() {
 }
 
 std::size_t KeyframeClouds::bytes() const {
-  return points() * sizeof(CloudPoint) + blocks_ * sizeof(CloudBlock) +
-         open_cells_.bytes() + entries_.size() * sizeof(decltype(entries_)::value_type) +
-         free_cells_ * sizeof(FreeCell) + (open_free_ ? open_free_->bytes() : 0);
+  return points() * sizeof(CloudPoint) + blocks_ * sizeof(CloudBlock) + open_cells_.bytes() +
+         entries_.size() * sizeof(decltype(entries_)::value_type) + free_cells_ * sizeof(FreeCell) +
+         (open_free_ ? open_free_->bytes() : 0);
 }
 
 StoredCloud KeyframeClouds::view(std::int32_t id) const {
