@@ -18,16 +18,6 @@ std::uint64_t key_of(const Eigen::Vector3i& cell) {
   return (part(cell.x()) << 42U) | (part(cell.y()) << 21U) | part(cell.z());
 }
 
-/// Calls `visit` for the cells within `reach` of `centre` along each axis, itself among them.
-template <class Visit>
-void for_each_around(const Eigen::Vector3i& centre, int reach, Visit visit) {
-  for (int x = -reach; x <= reach; ++x) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int z = -reach; z <= reach; ++z) visit(Eigen::Vector3i(centre + Eigen::Vector3i(x, y, z)));
-    }
-  }
-}
-
 }  // namespace
 
 void PlaneMap::Moments::operator+=(const Moments& other) {
@@ -74,9 +64,9 @@ PlaneMap PlaneMap::coarser(double voxel_m) const {
 
 PlaneMap::Moments& PlaneMap::moments_at(const Eigen::Vector3d& point) {
   const Eigen::Vector3i cell = cell_of<double>(point / voxel_m_);
-  const auto [place, is_new] = places_.try_emplace(key_of(cell), static_cast<std::uint32_t>(contents_.size()));
-  if (is_new) contents_.push_back({{}, point, cell});
-  return contents_[place->second].moments;
+  const std::uint32_t voxel = index_.enter(cell);
+  if (voxel == contents_.size()) contents_.push_back({{}, point, cell});
+  return contents_[voxel].moments;
 }
 
 void PlaneMap::note_centres() {
@@ -86,22 +76,15 @@ void PlaneMap::note_centres() {
   }
 }
 
-std::optional<std::size_t> PlaneMap::find(const Eigen::Vector3i& cell) const {
-  const auto found = places_.find(key_of(cell));
-  if (found == places_.end()) return std::nullopt;
-  return found->second;
-}
-
 std::optional<std::size_t> PlaneMap::nearest_voxel(const Eigen::Vector3d& point, double radius_m) const {
   const auto distance2 = [&](std::size_t i) { return (voxels_[i].centre_of_gravity - point).squaredNorm(); };
   const Eigen::Vector3i home = cell_of<double>(point / voxel_m_);
   double best = radius_m * radius_m;
-  if (const auto here = find(home)) return distance2(*here) < best ? here : std::nullopt;
+  if (const auto here = index_.find(home)) return distance2(*here) < best ? here : std::nullopt;
   std::optional<std::size_t> nearest;
-  for_each_around(home, 1, [&](const Eigen::Vector3i& cell) {
-    const auto there = find(cell);
-    if (!there || distance2(*there) >= best) return;
-    best = distance2(*there);
+  index_.for_each_around(home, 1, [&](std::uint32_t there) {
+    if (distance2(there) >= best) return;
+    best = distance2(there);
     nearest = there;
   });
   return nearest;
@@ -110,9 +93,7 @@ std::optional<std::size_t> PlaneMap::nearest_voxel(const Eigen::Vector3d& point,
 void PlaneMap::fit(std::size_t voxel) {
   const auto moments_within = [&](int reach) {
     Moments sum;
-    for_each_around(contents_[voxel].cell, reach, [&](const Eigen::Vector3i& cell) {
-      if (const auto there = find(cell)) sum += contents_[*there].moments;
-    });
+    index_.for_each_around(contents_[voxel].cell, reach, [&](std::uint32_t there) { sum += contents_[there].moments; });
     return sum;
   };
   voxels_[voxel].fit = Fit::kNoPlane;

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <boost/unordered/unordered_flat_map.hpp>
 
+#include "backend/voxel_index.h"
 #include "common/measurements.h"
 #include "common/pose.h"
 
@@ -32,8 +32,8 @@ struct CloudInMap {
   Pose T_map_cloud;
 };
 
-/// The surfaces of some clouds in one frame: a hash grid of voxels that hold the first and second moments of their
-/// points. It answers "which plane is near" with one or a few probes; planes are fitted once, when first asked for, and
+/// The surfaces of some clouds in one frame: a grid of voxels that hold the first and second moments of their points.
+/// It answers "which plane is near" with one or a few probes; planes are fitted once, when first asked for, and
 /// answers depend on the points alone, not on the order of the questions. Not for use by several threads.
 class PlaneMap {
  public:
@@ -88,7 +88,6 @@ class PlaneMap {
   PlaneMap(double voxel_m, int fit_reach, const PlaneGates& gates);
   Moments& moments_at(const Eigen::Vector3d& point);
   void note_centres();
-  [[nodiscard]] std::optional<std::size_t> find(const Eigen::Vector3i& cell) const;
   [[nodiscard]] std::optional<std::size_t> nearest_voxel(const Eigen::Vector3d& point, double radius_m) const;
   void fit(std::size_t voxel);
 
@@ -96,8 +95,8 @@ class PlaneMap {
   int fit_reach_;  ///< voxels on either side that belong to the neighbourhood of a plane
   PlaneGates gates_;
   std::vector<Voxel> voxels_;
-  std::vector<Content> contents_;                                   ///< by voxel
-  boost::unordered_flat_map<std::uint64_t, std::uint32_t> places_;  ///< in voxels_, by key of the cell
+  std::vector<Content> contents_;  ///< by voxel
+  VoxelIndex index_;               ///< numbers of the voxels
 };
 
 /// The first finite point of each cubic voxel, in the order of the cloud.

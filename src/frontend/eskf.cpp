@@ -2,6 +2,7 @@
 #include "frontend/eskf.h"
 
 #include "common/so3.h"
+#include "frontend/error_step.h"
 
 namespace ignis {
 namespace {
@@ -110,25 +111,7 @@ ErrorCovariance transition(const NavState& state, const InertialInput& input, do
 void predict(FilterState& filter, const InertialInput& input, double dt, const FrontendConfig& config,
              double noise_scale) {
   if (dt <= 0.0) return;
-  const ErrorCovariance F = transition(filter.nominal, input, dt, config.gravity_m);
-
-  // White noise of a sample enters the step where its bias does, so the bias columns of F are its input matrix.
-  Eigen::Matrix<double, 9, 6> G = F.block<9, 6>(0, kGyroBias);
-  G.leftCols<3>() *= config.imu_noise_gyro * std::sqrt(noise_scale / dt);
-  G.rightCols<3>() *= config.imu_noise_accel * std::sqrt(noise_scale / dt);
-
-  // Biases and gravity stay as they are: the rows of F below the ninth are those of the identity.
-  constexpr int kMoving = 9;
-  constexpr int kConstant = kErrorSize - kMoving;
-  const auto F_moving = F.topRows<kMoving>();
-  const Eigen::Matrix<double, kMoving, kErrorSize> FP = F_moving * filter.covariance;
-  ErrorCovariance P = filter.covariance;
-  P.topLeftCorner<kMoving, kMoving>() = FP * F_moving.transpose() + G * G.transpose();
-  P.topRightCorner<kMoving, kConstant>() = FP.rightCols<kConstant>();
-  P.bottomLeftCorner<kConstant, kMoving>() = FP.rightCols<kConstant>().transpose();
-  P.diagonal().segment<3>(kGyroBias).array() += config.gyro_bias_walk * config.gyro_bias_walk * dt;
-  P.diagonal().segment<3>(kAccelBias).array() += config.accel_bias_walk * config.accel_bias_walk * dt;
-  filter.covariance = 0.5 * (P + P.transpose());
+  ErrorStep(filter.nominal, input, dt, config, noise_scale).carry(filter.covariance);
   filter.nominal = predict_nominal(filter.nominal, input, dt, config.gravity_m);
 }
 

@@ -187,7 +187,7 @@ bool LocalMap::nearer_to_centre(const Eigen::Vector3f& point, const Eigen::Vecto
 
 NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius, const Eigen::Vector3d& side) const {
   const Box box = box_around(query, radius);
-  RowSums sums(radius, side.cast<float>());
+  RowSums<Sides::kOne> sums(radius, side.cast<float>());
   for_each_block(box, [&](const Block& block) {
     const Eigen::Vector3f local = relative_to(block, query);
     for_each_row(block, box, [&](const Row& row, std::uint32_t lanes) { sums.add(row, lanes, local); });

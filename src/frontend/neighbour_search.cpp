@@ -48,11 +48,16 @@ void NeighbourSearch::find_rows(const LocalMap& map, std::span<const Eigen::Vect
 
 void NeighbourSearch::add_rows(std::size_t queries, double radius, std::span<const Eigen::Vector3d> sides) {
   std::size_t next = 0;
-  for (std::size_t i = 0; i < queries; ++i) {
-    const Eigen::Vector3d side = sides.empty() ? Eigen::Vector3d::Zero().eval() : sides[i];
-    RowSums sums(radius, side.cast<float>());
-    for (; next < row_ends_[i]; ++next) sums.add(*rows_[next].row, rows_[next].lanes, rows_[next].query);
+  const auto add = [&](std::size_t query, auto sums) {
+    for (; next < row_ends_[query]; ++next) sums.add(*rows_[next].row, rows_[next].lanes, rows_[next].query);
     moments_.push_back(sums.moments());
+  };
+  for (std::size_t i = 0; i < queries; ++i) {
+    if (sides.empty()) {
+      add(i, RowSums<Sides::kAny>(radius));
+    } else {
+      add(i, RowSums<Sides::kOne>(radius, sides[i].cast<float>()));
+    }
   }
 }
 

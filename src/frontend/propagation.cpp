@@ -4,6 +4,7 @@
 // sample, and both across samples that are clipped or missing.
 #include <algorithm>
 
+#include "frontend/error_step.h"
 #include "frontend/lio.h"
 #include "frontend/steady_motion.h"
 
@@ -31,11 +32,11 @@ void Lio::advance_to(Utime utime) {
     const ImuSample last = interpolate(before, after, step_end);
     const InertialInput input = midpoint(first, last);
     const double dt = seconds_between(now, step_end);
-    FilterState cautious{filter_.nominal, cautious_};
-    predict(cautious, input, dt, config_, noise_scale(next));
-    cautious_ = cautious.covariance;
     if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
-    predict(filter_, input, dt, config_, noise_scale(next));
+    const ErrorStep step(filter_.nominal, input, dt, config_, noise_scale(next));
+    step.carry(cautious_);
+    step.carry(filter_.covariance);
+    filter_.nominal = predict_nominal(filter_.nominal, input, dt, config_.gravity_m);
     now = step_end;
     if (unaided_) unaided_->nominal.utime = now;
   }

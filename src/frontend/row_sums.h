@@ -9,12 +9,17 @@
 
 namespace ignis {
 
+/// Which points count: those seen from anywhere, or from one side of a plane only.
+enum class Sides { kAny, kOne };
+
 /// Adds up what rows of four voxels say about the neighbourhood of a query, four voxels at a time: one register of any
 /// 64-bit x86 or ARM. NeighbourMoments::add is the reference.
+template <Sides kSides>
 class RowSums {
  public:
-  /// Of the points within `radius` [m] that were seen from the side that `side` points to; zero: from any.
-  RowSums(double radius, const Eigen::Vector3f& side)
+  /// Of the points within `radius` [m]; with Sides::kOne of those that were seen from the side that `side` points to,
+  /// or from any where that is zero.
+  explicit RowSums(double radius, const Eigen::Vector3f& side = Eigen::Vector3f::Zero())
       : radius2_(all(static_cast<float>(radius * radius))), side_(side) {}
 
   /// `row` has four each of x, y, z [m], `weight`, `scan` and the direction `view_x` to `view_z`; bit k of `lanes` says
@@ -26,8 +31,10 @@ class RowSums {
     const Lanes view_x = load(row.view_x);
     const Lanes view_y = load(row.view_y);
     const Lanes view_z = load(row.view_z);
-    const LaneMask near = (dx * dx + dy * dy + dz * dz <= radius2_) & std::bit_cast<LaneMask>(kMasks[lanes]) &
-                          (view_x * all(side_.x()) + view_y * all(side_.y()) + view_z * all(side_.z()) >= Lanes{});
+    LaneMask near = (dx * dx + dy * dy + dz * dz <= radius2_) & std::bit_cast<LaneMask>(kMasks[lanes]);
+    if constexpr (kSides == Sides::kOne) {
+      near &= view_x * all(side_.x()) + view_y * all(side_.y()) + view_z * all(side_.z()) >= Lanes{};
+    }
     const Lanes weight = near ? load(row.weight) : Lanes{};
     count_ -= near;
     weight_ += weight;

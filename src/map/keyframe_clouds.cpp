@@ -7,6 +7,8 @@
 #include <tuple>
 #include <utility>
 
+#include <boost/unordered/unordered_flat_map.hpp>
+
 #include "common/grid.h"
 #include "map/tile_grid.h"
 
@@ -24,26 +26,48 @@ std::optional<CloudPoint> sound(const Eigen::Vector3d& p, float intensity) {
   return CloudPoint{p.cast<float>(), intensity > 0.0F ? std::min(intensity, 255.0F) : 0.0F};
 }
 
+/// The blocks that the points of a cloud lie in, numbered in the order of their keys.
+struct BlockNumbers {
+  std::vector<CellKey> keys;            ///< [block] ascending
+  std::vector<std::uint32_t> sizes;     ///< [block] points
+  std::vector<std::uint32_t> of_point;  ///< [point] block
+};
+
+BlockNumbers number_blocks(std::span<const CloudPoint> points) {
+  BlockNumbers blocks;
+  boost::unordered_flat_map<CellKey, std::uint32_t> numbers;  // in the order in which they are met
+  blocks.of_point.reserve(points.size());
+  for (const CloudPoint& point : points) {
+    const CellKey key = pack(cell_of(point.position.cast<double>(), 1.0 / CloudBlock::kEdge));
+    const auto [entry, is_new] = numbers.try_emplace(key, static_cast<std::uint32_t>(numbers.size()));
+    if (is_new) blocks.keys.push_back(key);
+    blocks.of_point.push_back(entry->second);
+  }
+  std::ranges::sort(blocks.keys);
+  std::vector<std::uint32_t> sorted(blocks.keys.size());
+  for (std::uint32_t i = 0; i < sorted.size(); ++i) sorted[numbers.at(blocks.keys[i])] = i;
+  blocks.sizes.resize(blocks.keys.size());
+  for (std::uint32_t& block : blocks.of_point) {
+    block = sorted[block];
+    ++blocks.sizes[block];
+  }
+  return blocks;
+}
+
 /// Neighbours in space become neighbours in memory, in blocks.
 void sort_into_blocks(CloudData& cloud) {
-  std::vector<std::pair<CellKey, std::uint32_t>> order;
-  order.reserve(cloud.points.size());
-  for (const CloudPoint& point : cloud.points) {
-    const CellIndex block = cell_of(point.position.cast<double>(), 1.0 / CloudBlock::kEdge);
-    order.emplace_back(pack(block), static_cast<std::uint32_t>(order.size()));
+  const BlockNumbers numbers = number_blocks(cloud.points);
+  std::uint32_t begin = 0;
+  for (std::size_t i = 0; i < numbers.keys.size(); ++i) {
+    const CellIndex block = unpack(numbers.keys[i]);
+    const Eigen::Vector3d centre =
+        CloudBlock::kEdge * (Eigen::Vector3d(block.x, block.y, block.z) + Eigen::Vector3d::Constant(0.5));
+    cloud.blocks.push_back({centre.cast<float>(), begin, begin});
+    begin += numbers.sizes[i];
   }
-  std::ranges::sort(order);
-  std::vector<CloudPoint> sorted;
-  sorted.reserve(cloud.points.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (i == 0 || order[i].first != order[i - 1].first) {
-      const CellIndex block = unpack(order[i].first);
-      const Eigen::Vector3d centre =
-          CloudBlock::kEdge * (Eigen::Vector3d(block.x, block.y, block.z) + Eigen::Vector3d::Constant(0.5));
-      cloud.blocks.push_back({centre.cast<float>(), static_cast<std::uint32_t>(i), 0});
-    }
-    cloud.blocks.back().end = static_cast<std::uint32_t>(i + 1);
-    sorted.push_back(cloud.points[order[i].second]);
+  std::vector<CloudPoint> sorted(cloud.points.size());
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    sorted[cloud.blocks[numbers.of_point[i]].end++] = cloud.points[i];
   }
   cloud.points = std::move(sorted);
 }
@@ -94,8 +118,7 @@ std::span<const CloudPoint> KeyframeClouds::insert_open(std::span<const CloudPoi
     // The sensor stands near the body's origin; the few centimetres between are less than a cell.
     if (open_free_ && are_rays) open_free_->add_ray(T_keyframe_points.translation, p);
     if (open_free_ && !are_rays) open_free_->add_hit(p);
-    if (open_points_.size() < max_points_ && open_cells_.insert(pack(cell_of(p, per_metre))).second)
-      open_points_.push_back(*kept);
+    if (open_points_.size() < max_points_ && open_cells_.insert(cell_of(p, per_metre))) open_points_.push_back(*kept);
   }
   return std::span(open_points_).subspan(before);
 }
@@ -153,9 +176,9 @@ void KeyframeClouds::clear() {
 }
 
 std::size_t KeyframeClouds::bytes() const {
-  return points() * sizeof(CloudPoint) + blocks_ * sizeof(CloudBlock) +
-         open_cells_.bucket_count() * (sizeof(CellKey) + 1) + entries_.size() * sizeof(decltype(entries_)::value_type) +
-         free_cells_ * sizeof(FreeCell) + (open_free_ ? open_free_->bytes() : 0);
+  return points() * sizeof(CloudPoint) + blocks_ * sizeof(CloudBlock) + open_cells_.bytes() +
+         entries_.size() * sizeof(decltype(entries_)::value_type) + free_cells_ * sizeof(FreeCell) +
+         (open_free_ ? open_free_->bytes() : 0);
 }
 
 StoredCloud KeyframeClouds::view(std::int32_t id) const {

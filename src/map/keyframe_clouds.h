@@ -8,10 +8,9 @@
 #include <span>
 #include <vector>
 
-#include <boost/unordered/unordered_flat_set.hpp>
-
 #include "common/measurements.h"
 #include "common/pose.h"
+#include "map/cell_set.h"
 #include "map/free_space.h"
 #include "map/stored_cloud.h"
 
@@ -27,7 +26,7 @@ namespace ignis {
 ///
 /// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped,
 /// and when the open one alone is that large, it takes no more. Memory: 16 bytes per point, 20 per block of 2 m, and
-/// for the open keyframe 9 to 21 bytes per cell beside. With rays followed, 4 bytes per free cell.
+/// for the open keyframe 19 to 39 per block of 4x4x4 cells beside. With rays followed, 4 bytes per free cell.
 class KeyframeClouds {
  public:
   static constexpr std::int32_t kBeforeFirst = -1;
@@ -87,7 +86,7 @@ class KeyframeClouds {
   std::size_t max_points_;
   std::map<std::int32_t, Entry> entries_;
   std::vector<CloudPoint> open_points_;
-  boost::unordered_flat_set<CellKey> open_cells_;
+  CellSet open_cells_;
   std::optional<FreeSpace> open_free_;
   std::size_t blocks_ = 0;  // of the closed ones, as are the free cells
   std::size_t free_cells_ = 0;

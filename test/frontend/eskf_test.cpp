@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "common/so3.h"
+#include "frontend/error_step.h"
 
 namespace ignis {
 namespace {
@@ -169,6 +170,33 @@ TEST(Eskf, CovarianceStaysSymmetricPositiveDefinite) {
   for (int i = 0; i < 5000; ++i) predict(filter, random_input(random), 0.004, config);
   EXPECT_EQ((filter.covariance - filter.covariance.transpose()).cwiseAbs().maxCoeff(), 0.0);
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<ErrorCovariance>(filter.covariance).eigenvalues()[0], 0.0);
+}
+
+TEST(ErrorStep, CarriesACovarianceAsTheProductOfTheWholeMatricesDoes) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  const FrontendConfig config;
+  constexpr double kDt = 0.004;
+  constexpr double kScale = 3.0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const NavState state = random_state(random);
+    const InertialInput input = random_input(random);
+    const ErrorCovariance root = ErrorCovariance::NullaryExpr([&] { return normal(random); });
+    const ErrorCovariance before = root * root.transpose();
+    ErrorCovariance after = before;
+    ErrorStep(state, input, kDt, config, kScale).carry(after);
+
+    const ErrorCovariance F = transition(state, input, kDt, config.gravity_m);
+    Eigen::Matrix<double, 6, 6> samples = Eigen::Matrix<double, 6, 6>::Identity() * kScale / kDt;
+    samples.topLeftCorner<3, 3>() *= config.imu_noise_gyro * config.imu_noise_gyro;
+    samples.bottomRightCorner<3, 3>() *= config.imu_noise_accel * config.imu_noise_accel;
+    ErrorCovariance expected = F * before * F.transpose();
+    expected.topLeftCorner<9, 9>() += F.block<9, 6>(0, kGyroBias) * samples * F.block<9, 6>(0, kGyroBias).transpose();
+    expected.diagonal().segment<3>(kGyroBias).array() += config.gyro_bias_walk * config.gyro_bias_walk * kDt;
+    expected.diagonal().segment<3>(kAccelBias).array() += config.accel_bias_walk * config.accel_bias_walk * kDt;
+    EXPECT_LT((after - expected).cwiseAbs().maxCoeff(), 1e-13 * expected.cwiseAbs().maxCoeff());
+    EXPECT_EQ((after - after.transpose()).cwiseAbs().maxCoeff(), 0.0);
+  }
 }
 
 TEST(Eskf, GapMultipliesWhiteNoise) {
