@@ -16,9 +16,9 @@ struct IncrementStep {
 };
 
 /// Covariance of increment, accelerometer bias and gyro bias, in this order, carried over one sample: F P F^T + noise
-/// as gtsam::PreintegratedCombinedMeasurements has it, without the products with zeros, which are most of them. For
-/// 250 samples a second these were the larger half of the back end's cost. `bias_variance` is that of the biases while
-/// they integrate.
+/// as gtsam::PreintegratedCombinedMeasurements has it, without the products with zeros, which are most of them. At
+/// 250 samples a second these were half of the back end's cost until loops come. `bias_variance` is that of the biases
+/// while they integrate.
 void carry_over_sample(Matrix15d& covariance, const IncrementStep& step, double dt, const ImuNoise& noise,
                        double bias_variance);
 
