@@ -6,6 +6,7 @@
 #include <format>
 
 #include "backend/gtsam_conversion.h"
+#include "backend/increment_covariance.h"
 
 namespace ignis {
 namespace {
@@ -74,13 +75,17 @@ std::optional<std::string> imu_problem(std::span<const ImuSample> samples, Utime
 
 gtsam::PreintegratedCombinedMeasurements preintegrate(std::span<const ImuSample> samples, Utime start, Utime end,
                                                       const NavState& start_state, const ImuNoise& noise) {
-  gtsam::PreintegratedCombinedMeasurements sum(parameters(noise), bias_of(start_state));
+  gtsam::TangentPreintegration sum(parameters(noise), bias_of(start_state));
+  Matrix15d covariance = Matrix15d::Zero();
+  IncrementStep step;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const Utime from = i == 0 ? start : samples[i].utime;
     const Utime to = i + 1 < samples.size() ? samples[i + 1].utime : end;
-    sum.integrateMeasurement(samples[i].accel, samples[i].gyro, seconds_between(from, to));
+    const double dt = seconds_between(from, to);
+    sum.update(samples[i].accel, samples[i].gyro, dt, &step.by_increment, &step.by_accel, &step.by_gyro);
+    carry_over_sample(covariance, step, dt, noise, kBiasWhileIntegrating);
   }
-  return sum;
+  return {sum, covariance};
 }
 
 ImuSum plain_sum(const gtsam::PreintegratedCombinedMeasurements& sum) {
