@@ -11,6 +11,7 @@
 #include "backend/keyframe_check.h"
 #include "backend/keyframe_factors.h"
 #include "backend/plane_map.h"
+#include "backend/scan_trust.h"
 
 namespace ignis {
 namespace {
@@ -51,7 +52,7 @@ SolverOutcome insert_next(const Keyframe& keyframe, const BackendConfig& config,
   // The information belongs to the interval since id - 1 and says nothing about a longer one.
   WhiteningRows odometry(0, 6);
   if (keyframe.id == previous.id + 1) {
-    odometry = whitening_with_floor(config.scan_information_scale * keyframe.scan_information,
+    odometry = whitening_with_floor(config.scan_information_scale * trusted_information(keyframe.scan_information),
                                     config.odometry_floor_rad, config.odometry_floor_m);
   }
   node.odometry = odometry.rows() > 0 ? odometry : loose_rows(config);
