@@ -104,7 +104,8 @@ bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state) {
 
 SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
                               SmootherState& state, std::string& left_out) {
-  GraphNode node{{keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body, {}}, {}, pose_covariance(keyframe), {}};
+  GraphNode node{
+      {keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body, {}}, {}, pose_covariance(keyframe), {}};
   SolverOutcome outcome = state.nodes.empty() ? insert_first(keyframe, config, solver, node)
                                               : insert_next(keyframe, config, solver, state, node, left_out);
   if (!outcome.accepted) return outcome;

@@ -36,7 +36,7 @@ class OdometryChain {
 
  private:
   std::vector<Pose> poses_;
-  std::vector<Matrix6d> sums_;           ///< of all steps so far, in axes of odom
+  std::vector<Matrix6d> sums_;          ///< of all steps so far, in axes of odom
   Matrix6d newest_ = Matrix6d::Zero();  ///< the filter's covariance of the newest pose, in axes of odom
 };
 

@@ -18,9 +18,9 @@ namespace ignis {
 /// A keyframe in the graph.
 struct GraphNode {
   LinkEnd end;
-  WhiteningRows odometry;  ///< of the link to the previous node, for the exported graph
+  WhiteningRows odometry;                       ///< of the link to the previous node, for the exported graph
   Matrix6d pose_covariance = Matrix6d::Zero();  ///< the front end's, of T_odom_body; attitude then position, body axes
-  KeyframeLink link;       ///< what its factors are made of
+  KeyframeLink link;                            ///< what its factors are made of
 };
 
 /// A loop that the match has verified.

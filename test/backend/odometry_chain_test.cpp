@@ -125,7 +125,8 @@ TEST(OdometryChain, AnErrorThatTurnsTheWholeDriveIsNoGrowth) {
   OdometryChain chain;
   const Matrix6d step = 1e-6 * Matrix6d::Identity();
   for (int i = 0; i <= 20; ++i) {
-    const Pose T_odom_body{Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d::UnitY())), {0.0, 0.0, -5.0 * i}};
+    const Pose T_odom_body{Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d::UnitY())),
+                           {0.0, 0.0, -5.0 * i}};
     const Matrix6d to_body = adjoint(T_odom_body.inverse());
     chain.append(T_odom_body, step, to_body * start * to_body.transpose());
   }

@@ -109,8 +109,8 @@ void follow_step(Matrix15d& covariance, const Pose& T_previous_this, const Pose&
     return to_axes;
   };
   const Eigen::Quaterniond R_odom_previous = T_odom_body.rotation * T_previous_this.rotation.conjugate();
-  const Matrix6d step = rotated(T_odom_body.rotation) * adjoint(T_previous_this.inverse()) *
-                        rotated(R_odom_previous.conjugate());
+  const Matrix6d step =
+      rotated(T_odom_body.rotation) * adjoint(T_previous_this.inverse()) * rotated(R_odom_previous.conjugate());
   Vector6d noise;
   noise << Eigen::Vector3d::Constant(o.odometry_sigma_rad), Eigen::Vector3d::Constant(o.odometry_sigma_m);
   const Matrix6d pose = step * covariance.topLeftCorner<6, 6>() * step.transpose();
