@@ -73,7 +73,8 @@ struct BackendConfig {
     visit.number("prior_gyro_bias", self.prior_gyro_bias, {1e-6, 1.0}, "rad/s", "sigma of its gyro bias");
     visit.number("prior_accel_bias", self.prior_accel_bias, {1e-5, 5.0}, "m/s^2", "sigma of its accelerometer bias");
     visit.number("scan_information_scale", self.scan_information_scale, {1e-6, 10.0}, "1",
-                 "factor on the information of scan matching: residuals of one wall are not independent");
+                 "factor on the information of scan matching: below 1 where residuals of one wall are not independent, "
+                 "above 1 where the front end's noise is cautious");
     visit.number("odometry_floor_m", self.odometry_floor_m, {1e-6, 1.0}, "m",
                  "sigma of an independent position error per keyframe");
     visit.number("odometry_floor_rad", self.odometry_floor_rad, {1e-7, 1.0}, "rad",

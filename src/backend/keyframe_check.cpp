@@ -12,6 +12,7 @@ constexpr double kAbsurdPosition = 1e6;      // [m]
 constexpr double kAbsurdSpeed = 500.0;       // [m/s]
 constexpr double kLeapFreedom = 10.0;        // [m] whatever the interval: a correction of the front end
 constexpr double kAbsurdBias = 100.0;        // [rad/s] or [m/s^2]
+constexpr double kAbsurdVariance = 1e12;     // in units of the state: beyond it the chain's sums mean nothing
 
 }  // namespace
 
@@ -26,6 +27,7 @@ std::string keyframe_problem(const Keyframe& keyframe) {
   if (state.T_odom_body.translation.norm() > kAbsurdPosition) return "the position is absurd";
   if (state.v_odom.norm() > kAbsurdSpeed) return "the velocity is absurd";
   if (state.gyro_bias.norm() > kAbsurdBias || state.accel_bias.norm() > kAbsurdBias) return "a bias is absurd";
+  if (keyframe.covariance.cwiseAbs().maxCoeff() > kAbsurdVariance) return "the covariance is absurd";
   const Matrix6d& information = keyframe.scan_information;
   const double skewness = (information - information.transpose()).cwiseAbs().maxCoeff();
   if (skewness > kSymmetryTolerance * information.cwiseAbs().maxCoeff()) return "the scan information is not symmetric";

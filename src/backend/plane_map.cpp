@@ -12,12 +12,6 @@ namespace {
 // A plane must extend in two directions: the middle eigenvalue of a scan line alone is noise.
 constexpr double kSmallestWidthRatio = 0.02;
 
-std::uint64_t key_of(const Eigen::Vector3i& cell) {
-  constexpr std::uint64_t kMask = (1U << 21U) - 1U;
-  const auto part = [](int v) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(v)) & kMask; };
-  return (part(cell.x()) << 42U) | (part(cell.y()) << 21U) | part(cell.z());
-}
-
 }  // namespace
 
 void PlaneMap::Moments::operator+=(const Moments& other) {

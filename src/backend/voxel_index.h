@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cassert>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -9,6 +10,13 @@
 #include <boost/unordered/unordered_flat_map.hpp>
 
 namespace ignis {
+
+/// A cell as one number, for hash tables. Coordinates from -2^20 to 2^20 - 1 are told apart.
+[[nodiscard]] inline std::uint64_t key_of(const Eigen::Vector3i& cell) {
+  constexpr std::uint64_t kMask = (1U << 21U) - 1U;
+  const auto part = [](int v) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(v)) & kMask; };
+  return (part(cell.x()) << 42U) | (part(cell.y()) << 21U) | part(cell.z());
+}
 
 /// Numbers the cells of a grid from 0 in the order in which they are entered. Cells live in blocks of 4x4x4 with one
 /// bit of occupancy each, so that a neighbourhood, most of which is empty, costs one to eight probes of a hash table
@@ -43,6 +51,7 @@ class VoxelIndex {
   /// order of x, then y, then z.
   template <class Visit>
   void for_each_around(const Eigen::Vector3i& centre, int reach, Visit visit) const {
+    assert(reach >= 0 && reach <= kLargestReach);
     const Eigen::Vector3i lo = centre.array() - reach;
     const Eigen::Vector3i hi = centre.array() + reach;
     const Eigen::Vector3i first = block_of(lo);
@@ -84,11 +93,6 @@ class VoxelIndex {
   }
   [[nodiscard]] static int bit_of(const Eigen::Vector3i& cell) {
     return (cell.x() & 3) << (2 * kEdgeBits) | (cell.y() & 3) << kEdgeBits | (cell.z() & 3);
-  }
-  [[nodiscard]] static std::uint64_t key_of(const Eigen::Vector3i& block) {
-    constexpr std::uint64_t kMask = (1U << 21U) - 1U;
-    const auto part = [](int v) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(v)) & kMask; };
-    return (part(block.x()) << 42U) | (part(block.y()) << 21U) | part(block.z());
   }
   [[nodiscard]] const Block* find_block(const Eigen::Vector3i& block) const {
     const auto found = places_.find(key_of(block));

@@ -171,6 +171,29 @@ TEST(SmootherJournalRecords, TheFirstThatDoesNotFitEndsItAndIsNamed) {
   EXPECT_TRUE(testing::contains(restored(cut).problem, "no change of a graph"));
 }
 
+TEST(SmootherJournalRecords, HoldWhatTheFrontEndKnowsOfItsDrift) {
+  // A loop that is 4 m off contradicts the steps of the odometry, but not a front end that says it has drifted.
+  const auto verdict = [](double drift_variance, bool killed) {
+    const testing::Drive drive = testing::make_drive({.keyframes = 26});
+    Smoother smoother{BackendConfig(), LoopGates()};
+    Records records;
+    for (Keyframe keyframe : drive.keyframes) {
+      keyframe.covariance.diagonal().segment<3>(kPosition).array() += drift_variance * keyframe.id;
+      EXPECT_TRUE(smoother.add_keyframe(keyframe).accepted());
+      records.push_back(smoother.take_change());
+    }
+    if (killed) smoother = restored(records).smoother;
+    Pose error;
+    error.translation.x() = 4.0;
+    return smoother
+        .add_loop({25, 2, drive.T_world_body[2].inverse() * drive.T_world_body[25] * error, 1e4 * Matrix6d::Identity()})
+        .loop->reason;
+  };
+  EXPECT_EQ(verdict(0.0, false), LoopReason::kContradictsOdometry);
+  EXPECT_EQ(verdict(0.25, false), LoopReason::kNeedsSupport);
+  EXPECT_EQ(verdict(0.25, true), LoopReason::kNeedsSupport);
+}
+
 TEST(SmootherJournalRecords, HoldWhatChangedAndNothingElse) {
   const testing::Drive drive = testing::make_drive({.seed = 4, .keyframes = 50});
   BackendConfig config;

@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 
+#include "backend/scan_trust.h"
 #include "backend/synthetic_drive.h"
 #include "backend/text_contains.h"
 #include "common/config_check.h"
@@ -83,6 +84,21 @@ TEST(Smoother, CountsTheScanInformationOnce) {
   }
 }
 
+TEST(Smoother, BelievesLittleOfWhatScansHardlyObserve) {
+  testing::Drive drive = testing::make_drive({.keyframes = 2});
+  BackendConfig config = without_loops();
+  config.imu.accel_noise = 10.0;
+  config.imu.gyro_noise = 1.0;
+  Matrix6d& information = drive.keyframes[1].scan_information;
+  information(5, 5) *= 0.01;
+  Smoother smoother(config, LoopGates());
+  static_cast<void>(smoother.add_keyframe(drive.keyframes[0]));
+  const SmootherUpdate update = smoother.add_keyframe(drive.keyframes[1]);
+  ASSERT_TRUE(update.covariance_valid);
+  EXPECT_NEAR(update.covariance(5, 5) * trusted_information(information)(5, 5), 1.0, 0.1);
+  EXPECT_GT(update.covariance(5, 5) * information(5, 5), 5.0);
+}
+
 TEST(Smoother, WantsKeyframesInOrder) {
   const testing::Drive drive = testing::make_drive({.keyframes = 8});
   Smoother smoother = filled(drive.keyframes, 5);
@@ -141,6 +157,8 @@ TEST(Smoother, RefusesWhatIsNotFiniteAndStaysAsItWas) {
       {"velocity", [](Keyframe& k, double v) { k.state.v_odom.x() = v; }},
       {"bias", [](Keyframe& k, double v) { k.state.gyro_bias.z() = v; }},
       {"information", [](Keyframe& k, double v) { k.scan_information(2, 4) = v; }},
+      {"covariance is not finite", [](Keyframe& k, double v) { k.covariance(1, 3) = v; }},
+      {"covariance is absurd", [](Keyframe& k, double) { k.covariance(4, 4) = 1e200; }},
       {"symmetric", [](Keyframe& k, double) { k.scan_information(2, 4) = 1e3; }},
       {"unit length", [](Keyframe& k, double) { k.state.T_odom_body.rotation.coeffs() *= 1.1; }},
       {"leap", [](Keyframe& k, double) { k.state.T_odom_body.translation.x() += 2000.0; }},
