@@ -22,7 +22,8 @@ _READY_FD = 3
 _LOG_BYTES = 1_000_000
 _LOG_FILES = 5
 # A process that ends again and again is started later and later. The first three times cost a drive nothing; s6 itself
-# waits a second when a process has lived for less.
+# waits a second when a process has lived for less. A stop ends the pause too: a sleep that lived on would hold the
+# logger's pipe open, and s6 waits for its loggers.
 _PAUSE = r"""deaths=0
 now=$(date +%s)
 for stamp in $(s6-svdt . | cut -c2-17); do
@@ -34,7 +35,10 @@ done
 case $deaths in 0 | 1 | 2 | 3) pause=0 ;; 4) pause=2 ;; 5) pause=5 ;; *) pause=10 ;; esac
 if [ $pause -gt 0 ]; then
   echo "ended $deaths times within a minute, at last with $(s6-svdt . | tail -n 1 | cut -c27-); next start in $pause s"
-  sleep $pause
+  sleep $pause &
+  trap "kill $!; exit" TERM
+  wait $!
+  trap - TERM
 fi"""
 
 
