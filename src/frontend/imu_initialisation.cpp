@@ -4,6 +4,7 @@
 #include <cmath>
 #include <format>
 #include <numbers>
+#include <string_view>
 
 #include "common/frames.h"
 
@@ -18,6 +19,7 @@ constexpr double kAttitudeSigma = 1e-4;      // rad
 constexpr double kWideTilt = 0.5;            // the prior of gravity's: the measurement decides
 constexpr double kRestVelocitySigma = 0.01;  // m/s
 constexpr std::size_t kMinSamples = 2;
+constexpr double kNoiseShare = 0.7;  // white noise reaches 1, a vibration 0.7 at a sixth of the sampling rate
 
 /// Attitude without yaw that turns the mean specific force to "up".
 Eigen::Quaterniond level_attitude(const Eigen::Vector3d& up_body) {
@@ -40,6 +42,15 @@ void condition_on_gravity(FilterState& filter, const Eigen::Vector3d& accel_mean
   filter.nominal = perturbed(filter.nominal, K * residual);
   const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
   filter.covariance = I_KH * filter.covariance * I_KH.transpose() + variance * K * K.transpose();
+}
+
+/// Why this spread is none of a vehicle at rest; empty when it may be. `noise` is the part of it from sample to sample.
+std::string spread_refusal(std::string_view sensor, std::string_view unit, double sigma, double noise, double limit) {
+  if (sigma <= limit) return "";
+  // A vehicle that moves changes little within one sample: what comes from sample to sample is a rotor or the sensor.
+  const bool noisy = noise > kNoiseShare * sigma;
+  return std::format("{}: {} sigma {:.3f} {} (limit {:.3f}){}", noisy ? "noisy" : "moving", sensor, sigma, unit, limit,
+                     noisy ? std::format("; if the vehicle stands, raise frontend.rest_{}_sigma", sensor) : "");
 }
 
 }  // namespace
@@ -131,12 +142,12 @@ std::string ImuInitialisation::refusal(const Window& window) const {
   if (gyro > config_.rest_gyro_mean) {
     return std::format("turning at {:.3f} rad/s (limit {:.3f})", gyro, config_.rest_gyro_mean);
   }
-  if (window.gyro_sigma > config_.rest_gyro_sigma) {
-    return std::format("moving: gyro sigma {:.3f} rad/s (limit {:.3f})", window.gyro_sigma, config_.rest_gyro_sigma);
-  }
-  if (!accel_quiet) {
-    return std::format("moving: accel sigma {:.2f} m/s^2 (limit {:.2f})", window.accel_sigma, config_.rest_accel_sigma);
-  }
+  const std::string gyro_spread =
+      spread_refusal("gyro", "rad/s", window.gyro_sigma, window.gyro_noise, config_.rest_gyro_sigma);
+  if (!gyro_spread.empty()) return gyro_spread;
+  const std::string accel_spread =
+      spread_refusal("accel", "m/s^2", window.accel_sigma, window.accel_noise, config_.rest_accel_sigma);
+  if (!accel_spread.empty()) return accel_spread;
   // White noise explains a difference between the means of two halves of sqrt(4 / n) sigma; motion explains more.
   const double explained = 5.0 * std::sqrt(4.0 / static_cast<double>(samples_.size()));
   if (window.accel_drift > explained * window.accel_noise + 0.05 ||

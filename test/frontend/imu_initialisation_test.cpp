@@ -104,6 +104,19 @@ TEST(ImuInitialisation, RefusesAnAcceleratingVehicle) {
   EXPECT_NE(refusal([](ImuSample& s, double t) { s.accel.z() -= t; }).find("moving"), std::string::npos);
 }
 
+TEST(ImuInitialisation, TellsANoisySensorFromAMovingVehicle) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const std::string noisy = refusal([&](ImuSample& s, double) { s.accel.y() += 2.0 * normal(random); });
+  EXPECT_TRUE(noisy.contains("noisy: accel sigma 2.")) << noisy;
+  EXPECT_TRUE(noisy.contains("raise frontend.rest_accel_sigma")) << noisy;
+  const std::string noisy_gyro = refusal([&](ImuSample& s, double) { s.gyro.z() += 0.3 * normal(random); });
+  EXPECT_TRUE(noisy_gyro.contains("raise frontend.rest_gyro_sigma")) << noisy_gyro;
+  const std::string shaken = refusal([](ImuSample& s, double t) { s.accel.x() += 4.0 * std::sin(20.0 * t); });
+  EXPECT_TRUE(shaken.contains("moving: accel sigma 2.")) << shaken;
+  EXPECT_FALSE(shaken.contains("raise")) << shaken;
+}
+
 TEST(ImuInitialisation, KeepsWaitingAndStartsOnceItIsStill) {
   ImuInitialisation initialisation{FrontendConfig{}};
   const auto state = feed(initialisation, 6.0, [](ImuSample& s, double t) {
