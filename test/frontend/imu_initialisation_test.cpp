@@ -113,7 +113,7 @@ TEST(ImuInitialisation, TellsANoisySensorFromAMovingVehicle) {
   const std::string noisy_gyro = refusal([&](ImuSample& s, double) { s.gyro.z() += 0.3 * normal(random); });
   EXPECT_TRUE(noisy_gyro.contains("raise frontend.rest_gyro_sigma")) << noisy_gyro;
   const std::string shaken = refusal([](ImuSample& s, double t) { s.accel.x() += 4.0 * std::sin(20.0 * t); });
-  EXPECT_TRUE(shaken.contains("moving: accel sigma 2.")) << shaken;
+  EXPECT_TRUE(shaken.contains("moving: accel sigma 3.")) << shaken;
   EXPECT_FALSE(shaken.contains("raise")) << shaken;
 }
 
