@@ -46,10 +46,18 @@ struct NormalEquations {
   int walls_matched = 0;
 };
 
+/// What a plane and a residual count for. Where an edge passes for a plane the fit depends on how the place was seen,
+/// so that two visits see two planes (config.smooth_plane_m, as in the front end).
+double weight_of(const SurfacePlane& plane, double residual, double radius_m, const LoopMatcherConfig& config) {
+  const double kernel = kKernelPerRadius * radius_m;
+  const double limit2 = config.smooth_plane_m * config.smooth_plane_m;
+  const double smoothness = limit2 > 0.0 ? limit2 / (limit2 + plane.variance) : 1.0;
+  return smoothness / (1.0 + residual * residual / (kernel * kernel));
+}
+
 /// Of every `stride`-th point.
 NormalEquations accumulate(std::span<const SurfacePoint> source, std::size_t stride, PlaneMap& map,
-                           const Pose& T_map_source, double radius_m) {
-  const double kernel = kKernelPerRadius * radius_m;
+                           const Pose& T_map_source, double radius_m, const LoopMatcherConfig& config) {
   const Eigen::Matrix3d R_map_source = T_map_source.rotation.toRotationMatrix();
   const Eigen::Matrix3d R_source_map = R_map_source.transpose();
   NormalEquations sum;
@@ -66,7 +74,7 @@ NormalEquations accumulate(std::span<const SurfacePoint> source, std::size_t str
     if (!agree(point, n_source)) continue;
     Vector6d J;
     J << p_source.cross(n_source), n_source;
-    const double weight = 1.0 / (1.0 + residual * residual / (kernel * kernel));
+    const double weight = weight_of(*plane, residual, radius_m, config);
     sum.H += weight * J * J.transpose();
     sum.b -= weight * residual * J;
     sum.weighted_square += weight * residual * residual;
@@ -252,7 +260,7 @@ LoopMatch match_loop(LoopSource& source, std::span<const CloudInMap> map_clouds,
   while (!converged && match.iterations < config.max_iterations) {
     const bool far_off = radius > config.last_radius_m && radius >= coarse_voxel_m;
     const NormalEquations equations =
-        accumulate(source.points, stride, far_off ? coarse : map, match.T_map_source, radius);
+        accumulate(source.points, stride, far_off ? coarse : map, match.T_map_source, radius, config);
     const ObservedPart part = observed_part(equations, length, config.degenerate_ratio);
     ++match.iterations;
     if (part.directions == 0) break;
@@ -266,7 +274,7 @@ LoopMatch match_loop(LoopSource& source, std::span<const CloudInMap> map_clouds,
     radius = std::max(config.last_radius_m, kRadiusShrink * radius);
   }
 
-  const NormalEquations final_sum = accumulate(source.points, 1, map, match.T_map_source, config.last_radius_m);
+  const NormalEquations final_sum = accumulate(source.points, 1, map, match.T_map_source, config.last_radius_m, config);
   const ObservedPart part = observed_part(final_sum, length, config.degenerate_ratio);
   match.directions = part.directions;
   note_agreement(match, final_sum, T_map_source_predicted);

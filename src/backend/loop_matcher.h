@@ -26,6 +26,7 @@ struct LoopMatcherConfig {
   double last_radius_m = 0.5;       ///< search radius at the end; a matched point has a plane within it
   double plane_thickness_m = 0.08;  ///< largest standard deviation across a plane
   int plane_min_points = 6;         ///< fewest points of a plane
+  double smooth_plane_m = 0.0;      ///< a plane with this standard deviation counts half; 0: all count alike
   double degenerate_ratio = 0.01;   ///< a direction below this share of the matched points' weight is left free
   int min_directions = 5;           ///< fewest directions that the geometry must hold: a wall beside the floor
   double min_wall_fraction = 0.5;   ///< upright surfaces that must find their like; a floor fits any other floor
@@ -46,6 +47,8 @@ struct LoopMatcherConfig {
     visit.number("plane_thickness_m", self.plane_thickness_m, {0.001, 1.0}, "m",
                  "largest standard deviation across a plane");
     visit.integer("plane_min_points", self.plane_min_points, {3, 1000}, "points", "fewest points of a plane");
+    visit.number("smooth_plane_m", self.smooth_plane_m, {0.0, 1.0}, "m",
+                 "a plane with this standard deviation across it counts half as much as a perfect one; 0: all alike");
     visit.number("degenerate_ratio", self.degenerate_ratio, {0.0, 0.3}, "1",
                  "directions that hold less than this share of the matched points are left free");
     visit.integer("min_directions", self.min_directions, {1, 6}, "1", "fewest directions that the geometry must hold");

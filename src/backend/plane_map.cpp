@@ -2,6 +2,7 @@
 #include "backend/plane_map.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <boost/unordered/unordered_flat_set.hpp>
 
 #include "common/grid.h"
@@ -103,7 +104,7 @@ void PlaneMap::fit(std::size_t voxel) {
   const bool wide = spread(1) >= kSmallestWidthRatio * spread(2) && spread(1) > 4.0 * spread(0);
   if (!thin || !wide) return;
   voxels_[voxel].fit = Fit::kPlane;
-  voxels_[voxel].plane = {eigen.eigenvectors().col(0), mean};
+  voxels_[voxel].plane = {eigen.eigenvectors().col(0), mean, std::max(0.0, spread(0))};
 }
 
 std::optional<SurfacePlane> PlaneMap::plane(std::size_t voxel) {

@@ -18,6 +18,7 @@ namespace ignis {
 struct SurfacePlane {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit length, sign arbitrary
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double variance = 0.0;  ///< of the fitted points, across the plane [m^2]
 };
 
 /// When a neighbourhood counts as a plane.

@@ -169,6 +169,28 @@ TEST(LoopMatcher, SeesThatTheCandidateHasWallsWhichAreNotHere) {
   EXPECT_TRUE(match_cloud(empty, empty, Pose(), strict, LoopGates()).verified());
 }
 
+TEST(LoopMatcher, CountsAPlaneByHowSmoothItIs) {
+  // One wall is a hedge, 5 cm rough, that shows itself 8 cm farther away on the second visit; its opposite is plaster.
+  const auto visit = [](double farther, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<Eigen::Vector3d> points = room(false);
+    for (Eigen::Vector3d& p : points) {
+      if (p.x() > 4.99) p.x() += farther + 0.05 * normal(random);
+    }
+    return cloud_of(points);
+  };
+  const auto error = [&](double smooth_plane_m) {
+    LoopMatcherConfig config;
+    config.smooth_plane_m = smooth_plane_m;
+    const LoopMatch match = match_cloud(visit(0.08, 1), visit(0.0, 2), Pose(), config, LoopGates());
+    EXPECT_TRUE(match.verified()) << match.reason_text;
+    return std::abs(match.T_map_source.translation.x());
+  };
+  EXPECT_GT(error(0.0), 0.015);
+  EXPECT_LT(error(0.01), 0.4 * error(0.0));
+}
+
 TEST(LoopMatcher, DoesNotAskForWhatIsHidden) {
   // The candidate's outer walls stand behind the partitions that surround the body.
   const std::vector<Eigen::Vector3d> all = room(true);
