@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/blind_directions.h"
 
+#include <algorithm>
+
 #include <Eigen/Eigenvalues>
+
+#include "common/so3.h"
 
 namespace ignis {
 namespace {
@@ -12,7 +16,47 @@ constexpr int kMostHeldScans = 40;   // two seconds
 constexpr int kMostDisagreeing = 10;
 constexpr double kRelease = 1.5;  // evidence that ends blindness, relative to what would have prevented it
 
+/// Takes what a small motion of all that is seen is to a vehicle at one pose to what it is to one at another: attitude
+/// in body axes, position in odom axes.
+Matrix6d carry_of(const Pose& from, const Pose& to) {
+  const Eigen::Matrix3d R = from.rotation.toRotationMatrix();
+  Matrix6d carry = Matrix6d::Identity();
+  carry.topLeftCorner<3, 3>() = to.rotation.toRotationMatrix().transpose() * R;
+  carry.bottomLeftCorner<3, 3>() = -so3::skew(to.translation - from.translation) * R;
+  return carry;
+}
+
 }  // namespace
+
+void BlindDirections::move_to(const Pose& T_odom_body) {
+  const Matrix6d back = carry_of(T_odom_body, T_odom_body_);
+  for (Matrix6d* sum : {&sensitivity_, &noise_, &held_sensitivity_}) *sum = (back.transpose() * *sum * back).eval();
+  if (held_scans_ > 0) carry_directions(carry_of(T_odom_body_, T_odom_body));
+  T_odom_body_ = T_odom_body;
+}
+
+/// A shift is the same everywhere, and what is mostly one counts as a pure one: the bit of turn that noise mixes in
+/// would tilt it by more the farther the vehicle goes.
+void BlindDirections::carry_directions(const Matrix6d& carry) {
+  Vector6d scale = Vector6d::Ones();
+  scale.head<3>().setConstant(held_length_);
+  const Matrix6d scaled = scale.asDiagonal() * carry * scale.cwiseInverse().asDiagonal();
+  const auto is_blind = [&](Eigen::Index k) { return blind_[static_cast<std::size_t>(k)]; };
+  const auto is_shift = [&](Eigen::Index k) { return is_mostly_shift(held_basis_.col(k)); };
+  std::array<Eigen::Index, 6> order{0, 1, 2, 3, 4, 5};
+  // The first ones stay what they are, the others make room.
+  const auto observed = std::ranges::stable_partition(order, is_blind);
+  const auto turns = std::ranges::stable_partition(order.begin(), observed.begin(), is_shift);
+  if (turns.empty()) return;
+  Matrix6d basis = Matrix6d::Zero();
+  for (const Eigen::Index k : order) {
+    const Vector6d held = held_basis_.col(k);
+    Vector6d direction = !is_blind(k) ? held : is_shift(k) ? without_small_turn(held) : scaled * held;
+    direction -= basis * (basis.transpose() * direction).eval();
+    basis.col(k) = direction.normalized();
+  }
+  held_basis_ = basis;
+}
 
 DegeneracyAnalysis BlindDirections::add_scan(const Matrix6d& sensitivity, const Matrix6d& noise, bool settled,
                                              const DegeneracyLimits& limits) {

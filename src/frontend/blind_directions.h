@@ -4,6 +4,8 @@
 #include <array>
 
 #include "common/byte_codec.h"
+#include "common/measurement_bytes.h"
+#include "common/pose.h"
 #include "frontend/degeneracy.h"
 
 namespace ignis {
@@ -15,14 +17,21 @@ namespace ignis {
 /// known to a few degrees only, and a different one in each scan: what one scan leaves open, the next pins through the
 /// tilt between the two, the harder the better the other directions are observed. So a blind direction is averaged over
 /// two seconds and then stays what it is until it ends, and it takes more evidence to end it than to name it.
+///
+/// What is blind is a motion of all that is seen: of a corridor along itself, of a round tank about its axis. To a
+/// vehicle that drives on, the second is the same turn with another shift, so scans and directions are carried along.
 class BlindDirections {
  public:
+  /// The next scan is matched at about this pose.
+  void move_to(const Pose& T_odom_body);
+
   /// Takes what the next scan says (see analyse_degeneracy). `settled` is false while the map is so young that older
   /// scans say nothing about it.
   [[nodiscard]] DegeneracyAnalysis add_scan(const Matrix6d& sensitivity, const Matrix6d& noise, bool settled,
                                             const DegeneracyLimits& limits);
 
  private:
+  void carry_directions(const Matrix6d& carry);
   void restart(double length_m);
   void average_direction(const Matrix6d& sensitivity);
 
@@ -34,6 +43,7 @@ class BlindDirections {
   double held_length_ = 1.0;                      ///< [m] that scales attitude there: another one would tilt them
   int held_scans_ = 0;                            ///< in the mean; 0: nothing is blind
   int disagreeing_ = 0;                           ///< scans in a row that found more blind directions than are held
+  Pose T_odom_body_;                              ///< where all of this is meant
 
   friend void transfer(auto& io, FieldsOf<BlindDirections> auto& directions) {
     io.matrix(directions.sensitivity_);
@@ -44,6 +54,7 @@ class BlindDirections {
     io.number(directions.held_length_);
     io.number(directions.held_scans_);
     io.number(directions.disagreeing_);
+    transfer(io, directions.T_odom_body_);
   }
 };
 

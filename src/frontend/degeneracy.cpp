@@ -13,12 +13,6 @@ namespace {
 
 constexpr double kMostlyShift = 0.7;  // of a unit vector: beyond, it is more shift than turn
 
-Vector6d without_small_turn(const Vector6d& direction) {
-  Vector6d pure = direction;
-  if (direction.tail<3>().norm() > kMostlyShift) pure.head<3>().setZero();
-  return pure;
-}
-
 /// Adds a direction to an orthonormal list.
 void append_orthonormal(std::vector<Vector6d>& list, Vector6d direction) {
   for (const Vector6d& other : list) direction -= other * other.dot(direction);
@@ -31,6 +25,14 @@ double weight_of(double value, double noise) {
 }
 
 }  // namespace
+
+bool is_mostly_shift(const Vector6d& direction) { return direction.tail<3>().norm() > kMostlyShift; }
+
+Vector6d without_small_turn(const Vector6d& direction) {
+  Vector6d pure = direction;
+  if (is_mostly_shift(direction)) pure.head<3>().setZero();
+  return pure;
+}
 
 ScaledSensitivity::ScaledSensitivity(const Matrix6d& sensitivity, const Matrix6d& normal_noise, double length)
     : length_m(length) {

@@ -52,6 +52,12 @@ struct DegeneracyAnalysis {
 [[nodiscard]] DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6d& noise,
                                                     const DegeneracyLimits& limits);
 
+/// Whether a unit direction in scaled coordinates is more a shift than a turn.
+[[nodiscard]] bool is_mostly_shift(const Vector6d& direction);
+
+/// The shift alone of a unit direction that is mostly one; any other as it is.
+[[nodiscard]] Vector6d without_small_turn(const Vector6d& direction);
+
 /// The same for given orthonormal directions, the columns of `basis`; `needed` is the signal to noise that each needs.
 ///
 /// A degenerate direction that is mostly a shift is taken for a pure shift, which is what it is: with the attitude

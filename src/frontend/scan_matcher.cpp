@@ -78,6 +78,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
     return result;
   }
   const Assessment assessment = assess(result.filter);
+  blind_directions_.move_to(T_start);
   find_observed_directions(assessment, map);
   const double noise_ratio = kNoisyMapPoints / std::max(static_cast<double>(map.inserted_points()), 1.0);
   map_noise_ = 1.0 + noise_ratio * noise_ratio;

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "frontend/simulated_planes.h"
@@ -12,6 +15,7 @@ namespace {
 
 using test::corridor_planes;
 using test::Planes;
+using test::tank_planes;
 
 constexpr double kNormalSigma = 0.03;
 constexpr DegeneracyLimits kLimits{4.0, 1e-5, 2.0};
@@ -81,6 +85,31 @@ TEST(BlindDirections, FollowACorridorThatTurns) {
   for (std::uint32_t k = 60; k < 160; ++k) analysis = feed(true, k);
   ASSERT_EQ(analysis.degenerate_directions, 1);
   EXPECT_GT(std::abs(analysis.degenerate[0][3]), 0.99);
+}
+
+/// Round in a circle of 3.3 m about the axis of a tank, 4 cm a scan, over ground on which the vehicle pitches.
+Pose pose_in_tank(int scan) {
+  const double angle = 0.04 / 3.3 * scan;
+  const double pitch = 0.3 * std::sin(0.05 * scan);
+  return {Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()),
+          {3.3 * std::cos(angle), 0.0, -3.3 * std::sin(angle)}};
+}
+
+TEST(BlindDirections, AreCarriedAlongByAVehicleThatDrivesRoundInATank) {
+  BlindDirections blind;
+  for (int k = 0; k < 400; ++k) {
+    const Pose T_odom_body = pose_in_tank(k);
+    const Planes planes = tank_planes(T_odom_body, kNormalSigma, static_cast<std::uint32_t>(k));
+    blind.move_to(T_odom_body);
+    const DegeneracyAnalysis analysis = blind.add_scan(planes.sensitivity, planes.noise, true, kLimits);
+    if (k < 40) continue;
+    ASSERT_EQ(analysis.degenerate_directions, 1) << k;
+    // All that is seen, turned about the axis of the tank.
+    Vector6d turn;
+    turn << kLimits.length_m * (T_odom_body.rotation.inverse() * Eigen::Vector3d::UnitY()),
+        Eigen::Vector3d::UnitY().cross(T_odom_body.translation);
+    ASSERT_GT(std::abs(analysis.degenerate[0].dot(turn.normalized())), 0.99) << k;
+  }
 }
 
 TEST(BlindDirections, TakeTheNewestScanAloneWhileTheMapIsYoung) {
