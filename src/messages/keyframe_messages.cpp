@@ -13,6 +13,7 @@ namespace {
 // 28 bytes a sample and 7 bytes a point: both slices together stay below 56 kB beside the 2.3 kB of plain fields.
 constexpr std::int64_t kMaxImuPerPart = 800;
 constexpr std::int64_t kMaxCloudPerPart = 4500;
+constexpr std::size_t kMostOpen = 32;  // the answers to two requests
 
 std::int64_t parts_for(std::size_t items, std::int64_t per_part) {
   return (static_cast<std::int64_t>(items) + per_part - 1) / per_part;
@@ -125,8 +126,27 @@ std::vector<keyframe_t> to_messages(const Keyframe& keyframe) {
   return parts;
 }
 
+KeyframeAssembler::Open& KeyframeAssembler::open_for(const keyframe_t& part) {
+  const auto found =
+      std::ranges::find_if(open_, [&](const Open& open) { return open.session == part.session && open.id == part.id; });
+  if (found == open_.end()) {
+    open_.push_back({part.session, part.id, {}});
+  } else {
+    std::rotate(found, found + 1, open_.end());
+  }
+  return open_.back();
+}
+
 std::optional<Keyframe> KeyframeAssembler::add(const keyframe_t& part) {
-  const std::optional<std::vector<keyframe_t>> parts = parts_.add(part);
+  Open& open = open_for(part);
+  const std::int64_t given_up = open.parts.incomplete();
+  const std::optional<std::vector<keyframe_t>> parts = open.parts.add(part);
+  incomplete_ += open.parts.incomplete() - given_up;
+  if (open.parts.empty()) open_.pop_back();
+  if (open_.size() > kMostOpen) {
+    open_.pop_front();
+    ++incomplete_;
+  }
   if (!parts) return std::nullopt;
   const keyframe_t& first = parts->front();
   Keyframe keyframe;

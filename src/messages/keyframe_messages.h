@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -15,15 +17,26 @@ namespace ignis::messages {
 /// cloud reaches beyond 32 m), IMU samples to float.
 [[nodiscard]] std::vector<keyframe_t> to_messages(const Keyframe& keyframe);
 
-/// Puts the parts of keyframes together again.
+/// Puts the parts of keyframes together again. A request is answered with up to 16 keyframes in one go, and where the
+/// network lets their parts overtake each other all of them are on their way at once.
 class KeyframeAssembler {
  public:
   /// A complete keyframe, or nothing yet.
   [[nodiscard]] std::optional<Keyframe> add(const keyframe_t& part);
-  [[nodiscard]] std::int64_t incomplete() const { return parts_.incomplete(); }
+  /// Keyframes that were given up because a part never came.
+  [[nodiscard]] std::int64_t incomplete() const { return incomplete_; }
 
  private:
-  PartAssembler<keyframe_t> parts_;
+  struct Open {
+    std::int32_t session;
+    std::int32_t id;
+    PartAssembler<keyframe_t> parts;
+  };
+
+  Open& open_for(const keyframe_t& part);
+
+  std::deque<Open> open_;  ///< the last one is that of the newest part
+  std::int64_t incomplete_ = 0;
 };
 
 }  // namespace ignis::messages

@@ -42,6 +42,9 @@ class PartAssembler {
     return complete;
   }
 
+  /// No part waits for others.
+  [[nodiscard]] bool empty() const { return parts_.empty(); }
+
   /// Sequences that were given up because a part never came.
   [[nodiscard]] std::int64_t incomplete() const { return incomplete_; }
 

@@ -13,6 +13,7 @@ from hostile_messages import CHANNELS, altered_words, datagrams, malformed, send
 
 SEED = 20261122
 STATE_RATE = 250.0
+FLOOD = 1000  # messages at least
 
 
 def test_fault_b5_damaged_messages_leave_graph_and_keyframes_as_they_are(
@@ -142,11 +143,12 @@ def test_fault_b6_a_flood_does_not_stop_the_pose(drive_log: Path, undisturbed: S
 
         def meanwhile(seconds: float) -> None:
             nonlocal sent
-            for _ in range(100 if 1.0 < seconds < 4.0 else 0):
+            # On a busy machine three seconds do not hold a flood.
+            for _ in range(100 if 1.0 < seconds < 4.0 or (seconds >= 4.0 and sent <= FLOOD) else 0):
                 for channel, body in floods:
                     run.send(channel, body)
                     sent += 1
 
         run.play(drive_log, meanwhile)
-    assert sent > 1000
+    assert sent > FLOOD
     assert len(set(run.seen.states)) > 0.98 * len(set(undisturbed.states))

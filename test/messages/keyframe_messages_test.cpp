@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <random>
+#include <set>
+
 #include "common/so3.h"
 
 namespace ignis::messages {
@@ -64,6 +68,62 @@ TEST(KeyframeMessages, CoarsenTheResolutionInsteadOfWrapping) {
   for (std::size_t i = 0; i < keyframe.cloud.size(); ++i) {
     ASSERT_LT((back->cloud[i].position - keyframe.cloud[i].position).norm(), 0.004F);
   }
+}
+
+/// The parts of keyframes 0 to `count` - 1, two or more each, in any order.
+std::vector<keyframe_t> mixed_parts(int count) {
+  std::vector<keyframe_t> parts;
+  for (int id = 0; id < count; ++id) {
+    Keyframe keyframe = keyframe_of(10, 9000, 15.0F);
+    keyframe.id = id;
+    for (keyframe_t& part : to_messages(keyframe)) {
+      part.sequence = id;
+      parts.push_back(std::move(part));
+    }
+  }
+  std::ranges::shuffle(parts, std::mt19937(5));
+  return parts;
+}
+
+TEST(KeyframeMessages, ComeTogetherThoughTheirPartsOvertakeEachOther) {
+  KeyframeAssembler assembler;
+  std::set<std::int32_t> complete;
+  for (const keyframe_t& part : mixed_parts(32)) {
+    ASSERT_GT(part.part_count, 1);
+    if (const auto keyframe = assembler.add(part)) {
+      complete.insert(keyframe->id);
+      EXPECT_EQ(keyframe->cloud.size(), 9000U);
+    }
+  }
+  EXPECT_EQ(complete.size(), 32U);
+  EXPECT_EQ(assembler.incomplete(), 0);
+}
+
+TEST(KeyframeMessages, ThatStayIncompleteAreGivenUpInTheOrderOfTheirNewestPart) {
+  KeyframeAssembler assembler;
+  std::vector<std::vector<keyframe_t>> all(40);
+  for (keyframe_t& part : mixed_parts(40)) all[static_cast<std::size_t>(part.id)].push_back(std::move(part));
+  for (const auto& parts : all) EXPECT_FALSE(assembler.add(parts.front()));
+  EXPECT_EQ(assembler.incomplete(), 8);
+  EXPECT_TRUE(assembler.add(all[8].back()));
+  EXPECT_FALSE(assembler.add(all[7].back()));
+  keyframe_t impossible = all[9].front();
+  impossible.id = 100;
+  impossible.part = impossible.part_count;
+  EXPECT_FALSE(assembler.add(impossible));
+  EXPECT_EQ(assembler.incomplete(), 9);
+  EXPECT_TRUE(assembler.add(all[9].back()));
+}
+
+TEST(KeyframeMessages, OfTwoSessionsAreNotMixed) {
+  const std::vector<keyframe_t> parts = to_messages(keyframe_of(10, 9000, 15.0F));
+  ASSERT_EQ(parts.size(), 2U);
+  keyframe_t other = parts.back();
+  ++other.session;
+  KeyframeAssembler assembler;
+  EXPECT_FALSE(assembler.add(parts.front()));
+  EXPECT_FALSE(assembler.add(other));
+  EXPECT_TRUE(assembler.add(parts.back()));
 }
 
 }  // namespace
