@@ -142,10 +142,10 @@ std::string ImuInitialisation::refusal(const Window& window) const {
   if (gyro > config_.rest_gyro_mean) {
     return std::format("turning at {:.3f} rad/s (limit {:.3f})", gyro, config_.rest_gyro_mean);
   }
-  const std::string gyro_spread =
+  std::string gyro_spread =
       spread_refusal("gyro", "rad/s", window.gyro_sigma, window.gyro_noise, config_.rest_gyro_sigma);
   if (!gyro_spread.empty()) return gyro_spread;
-  const std::string accel_spread =
+  std::string accel_spread =
       spread_refusal("accel", "m/s^2", window.accel_sigma, window.accel_noise, config_.rest_accel_sigma);
   if (!accel_spread.empty()) return accel_spread;
   // White noise explains a difference between the means of two halves of sqrt(4 / n) sigma; motion explains more.
