@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <ranges>
+#include <vector>
 
 namespace ignis::l1 {
 
@@ -13,6 +14,7 @@ namespace {
 constexpr double kBucketUs = 100'000.0;
 constexpr double kAstrayUs = 100'000.0;
 constexpr double kAstrayForUs = 1'000'000.0;
+constexpr double kSteadyUs = 50'000.0;
 constexpr double kMaxSlope = 0.005;
 /// Below this span the noise of single delays would read as clock drift.
 constexpr double kMinSlopeSpanUs = 500'000.0;
@@ -32,16 +34,14 @@ void ClockLine::add(std::int64_t count, double time_us) {
     ++restarts_;
     return restart(count, time_us);
   }
-  if (distance <= kAstrayUs) {
-    astray_since_ = -1.0;
-  } else if (astray_since_ < 0.0) {
-    astray_since_ = x;
-  } else if (x - astray_since_ > kAstrayForUs) {
+  recent_distance_.push_back(std::max(distance, 0.0));
+  if (recent_distance_.size() > kRecent) recent_distance_.pop_front();
+  if (distance > kAstrayUs) {
+    if (!stays_astray(point)) return;
     ++restarts_;
     return restart(count, time_us);
   }
-  recent_distance_.push_back(std::max(distance, 0.0));
-  if (recent_distance_.size() > kRecent) recent_distance_.pop_front();
+  astray_.reset();
   const std::size_t before = best_.size();
   keep(point);
   if (distance < 0.0 || best_.size() != before) fit();
@@ -52,8 +52,19 @@ void ClockLine::restart(std::int64_t count, double time_us) {
   first_time_ = time_us;
   best_.assign(1, Point{0.0, 0.0});
   recent_distance_.clear();
-  astray_since_ = -1.0;
+  astray_.reset();
   fit();
+}
+
+bool ClockLine::stays_astray(const Point& point) {
+  if (!astray_) astray_ = Astray{.since_x = point.x};
+  const double for_us = point.x - astray_->since_x;
+  double& least = for_us < 0.5 * kAstrayForUs ? astray_->least_before : astray_->least_after;
+  least = std::min(least, point.y);
+  if (for_us <= kAstrayForUs) return false;
+  const bool steady = std::abs(astray_->least_after - astray_->least_before) < kSteadyUs;
+  astray_.reset();
+  return steady;
 }
 
 void ClockLine::keep(const Point& point) {

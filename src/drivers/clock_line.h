@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
+#include <optional>
 #include <vector>
 
 namespace ignis::l1 {
@@ -23,7 +25,8 @@ class ClockLine {
   ClockLine(double period_us, double window_us, Bound bound);
 
   /// Adds a datum; counts must not go down. A datum beyond the line by more than 100 ms, or data that stay that far off
-  /// for a second, mean that the counter lost its meaning: the fit starts afresh from it.
+  /// for a second, mean that the counter lost its meaning: the fit starts afresh from it. Data whose distance changes
+  /// in that second have waited in a queue that fills or drains, and are late only.
   void add(std::int64_t count, double time_us);
 
   /// Starts afresh from the next datum.
@@ -47,6 +50,14 @@ class ClockLine {
     double y;
   };
 
+  /// Data that are far off: since when, and the least excess of the first and the second half second.
+  struct Astray {
+    double since_x;
+    double least_before = std::numeric_limits<double>::infinity();
+    double least_after = std::numeric_limits<double>::infinity();
+  };
+
+  [[nodiscard]] bool stays_astray(const Point& point);
   [[nodiscard]] double excess_of_line(double x) const { return offset_ + slope_ * (x - pivot_); }
   void restart(std::int64_t count, double time_us);
   void keep(const Point& point);
@@ -61,7 +72,7 @@ class ClockLine {
   double slope_ = 0.0;      ///< [1] of the excess
   double offset_ = 0.0;     ///< [us] excess at pivot_
   double pivot_ = 0.0;
-  double astray_since_ = -1.0;
+  std::optional<Astray> astray_;
   std::deque<double> recent_distance_;
   std::int64_t restarts_ = 0;
 };

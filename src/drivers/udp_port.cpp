@@ -18,8 +18,9 @@ namespace {
 
 constexpr std::string_view kScheme = "udp://";
 constexpr std::chrono::seconds kOwnership{1};
-/// Two seconds of the stream, for a host that is held up; the kernel may grant less.
-constexpr int kReceiveBuffer = 512 * 1024;
+/// Some seconds of the stream, for a host that is held up: 610 datagrams a second, each of which takes up a kilobyte
+/// and more, however small. The kernel may grant less.
+constexpr int kReceiveBuffer = 4 * 1024 * 1024;
 
 std::string text_of(const sockaddr_in& address) {
   std::array<char, INET_ADDRSTRLEN> text{};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/clock_line.h"
 
+#include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -84,6 +85,38 @@ TEST(ClockLine, RidesOutAStallOfTheHost) {
   for (int i = 700; i < 1000; ++i) line.add(i, i * kPeriod);
   EXPECT_EQ(line.restarts(), 0);
   EXPECT_NEAR(line.at(1000), 1000 * kPeriod, 1.0);
+}
+
+TEST(ClockLine, RidesOutAQueueThatFillsAndDrains) {
+  for (const double drained_at : {20.0, 5.0, 2.0}) {  // times as fast as it fills
+    ClockLine line(kPeriod, kWindow, Bound::kUpper);
+    for (int i = 0; i < 500; ++i) line.add(i, i * kPeriod);
+    double lateness = 2e6;
+    for (int i = 500; i < 4000; ++i) {
+      line.add(i, i * kPeriod + lateness);
+      lateness = std::max(0.0, lateness - (1.0 - 1.0 / drained_at) * kPeriod);
+      ASSERT_NEAR(line.at(i), i * kPeriod, 1.0) << i;
+    }
+    EXPECT_EQ(line.restarts(), 0);
+  }
+}
+
+TEST(ClockLine, RidesOutAReaderThatFallsBehindAndCatchesUp) {
+  ClockLine line(kPeriod, kWindow, Bound::kUpper);
+  for (int i = 0; i < 500; ++i) line.add(i, i * kPeriod);
+  for (int i = 500; i < 1000; ++i) line.add(i, i * kPeriod + 0.3 * (i - 500) * kPeriod);
+  for (int i = 1000; i < 1500; ++i) line.add(i, i * kPeriod + 0.3 * (1500 - i) * kPeriod);
+  EXPECT_EQ(line.restarts(), 0);
+  EXPECT_NEAR(line.at(1500), 1500 * kPeriod, 1.0);
+}
+
+TEST(ClockLine, StartsAfreshBehindJitterToo) {
+  DelayedClock clock{0.0, 1.0};
+  ClockLine line(kPeriod, kWindow, Bound::kUpper);
+  for (int i = 0; i < 500; ++i) line.add(i, clock.truth(i) + clock.delay());
+  for (int i = 500; i < 1000; ++i) line.add(i, clock.truth(i) + 1e6 + 5.0 * clock.delay());
+  EXPECT_EQ(line.restarts(), 1);
+  EXPECT_NEAR(line.at(1000), clock.truth(1000) + 1e6, 100.0);
 }
 
 }  // namespace
