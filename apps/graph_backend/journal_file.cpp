@@ -5,11 +5,11 @@
 #include <cerrno>
 #include <cstring>
 #include <format>
+#include <utility>
 
 #include <boost/interprocess/file_mapping.hpp>
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include "runtime/application.h"
@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 namespace interprocess = boost::interprocess;
 
 constexpr const char* kName = "graph_backend.journal";
-constexpr const char* kLockName = "graph_backend.lock";
 constexpr std::chrono::seconds kRetryPeriod{1};
 constexpr std::size_t kMaxPending = 256U << 20U;  // some thousand keyframes
 
@@ -37,29 +36,14 @@ std::size_t LoadedJournal::end_of(std::size_t records) const {
   return static_cast<std::size_t>(last.data() + last.size() - bytes().data());
 }
 
-JournalFile::JournalFile(fs::path folder) : path_(folder / kName) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw runtime::UserError(std::format("cannot make the folder {}: {}", folder.string(), error.message()));
-  const fs::path lock_path = folder / kLockName;
-  lock_ = ::open(lock_path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
-  if (lock_ < 0) {
-    throw runtime::UserError(
-        std::format("{}: {}; --journal needs a folder that it may write to", lock_path.string(), std::strerror(errno)));
-  }
-  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    throw runtime::UserError(std::format("another graph_backend uses the journal in {}", folder.string()),
-                             runtime::kFailed);
-  }
-}
+JournalFile::JournalFile(fs::path folder)
+    : folder_(std::move(folder), "graph_backend", "journal"), path_(folder_.path() / kName) {}
 
 JournalFile::~JournalFile() {
-  if (file_ >= 0) {
-    write_pending();
-    fdatasync(file_);
-    close(file_);
-  }
-  close(lock_);
+  if (file_ < 0) return;
+  write_pending();
+  fdatasync(file_);
+  close(file_);
 }
 
 std::optional<LoadedJournal> JournalFile::load() const {

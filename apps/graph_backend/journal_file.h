@@ -14,6 +14,7 @@
 
 #include "backend/journal.h"
 #include "backend/record_archive.h"
+#include "runtime/state_folder.h"
 
 namespace ignis {
 
@@ -75,8 +76,8 @@ class JournalFile : public RecordArchive {
   void fail(const std::string& what, int error);
   [[nodiscard]] std::filesystem::path free_name(const char* suffix) const;
 
+  runtime::StateFolder folder_;
   std::filesystem::path path_;
-  int lock_ = -1;
   int file_ = -1;
   std::size_t size_ = 0;            ///< of whole records in the file
   std::vector<std::byte> pending_;  ///< encoded, not yet in the file

@@ -4,25 +4,13 @@
 // SMOOTHED_KEYFRAMES; each LIO_STATE is placed in map by the newest correction and leaves as SMOOTHED_STATE, at 50 Hz.
 // GRAPH_COMMAND withdraws and vetoes loops. With a journal, a killed process is succeeded by one with the same graph.
 
-#include <cstdlib>
-
 #include "backend_node.h"
+#include "runtime/state_folder.h"
 #include "runtime/stop_signal.h"
-
-namespace {
-
-/// A supervisor that gives a folder for state wants the state to outlast the process. Whoever starts it by hand asks
-/// for a journal by name, so that no files appear in folders unasked.
-std::string supervised_folder() {
-  const char* folder = std::getenv("STATE_DIRECTORY");
-  return folder != nullptr ? folder : "";
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   using namespace ignis::runtime;
-  std::string journal_folder = supervised_folder();
+  std::string journal_folder = supervised_folder("STATE_DIRECTORY");
   return run_application(
       "graph_backend", "Pose-graph smoother: keyframes in, corrected keyframes out.", argc, argv,
       [&](CLI::App& app) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/keyframe.h"
+#include "runtime/state_folder.h"
 
 namespace ignis {
 
@@ -22,9 +23,6 @@ class CheckpointFolder {
 
   /// Makes and locks the folder. Throws runtime::UserError that names folder and reason.
   explicit CheckpointFolder(std::filesystem::path folder);
-  ~CheckpointFolder();
-  CheckpointFolder(const CheckpointFolder&) = delete;
-  CheckpointFolder& operator=(const CheckpointFolder&) = delete;
 
   /// Empty when there is none, or when it cannot be read.
   [[nodiscard]] std::vector<std::byte> load() const;
@@ -41,8 +39,7 @@ class CheckpointFolder {
   void write(const std::filesystem::path& path, std::span<const std::byte> bytes);
   [[nodiscard]] std::filesystem::path keyframe_path(std::int32_t id) const;
 
-  std::filesystem::path folder_;
-  int lock_ = -1;
+  runtime::StateFolder folder_;
   std::string failure_;
 };
 

@@ -4,26 +4,14 @@
 // LIO_KEYFRAME every few metres out. KEYFRAME_REQUEST makes it send keyframes again. With a checkpoint, a killed
 // process is succeeded by one that goes on in the same session.
 
-#include <cstdlib>
-
 #include "frontend_node.h"
 
+#include "runtime/state_folder.h"
 #include "runtime/stop_signal.h"
-
-namespace {
-
-/// A supervisor that gives a folder for run time files wants a killed process to be succeeded within the drive. Whoever
-/// starts it by hand asks for a checkpoint by name, so that no files appear in folders unasked.
-std::string supervised_folder() {
-  const char* folder = std::getenv("RUNTIME_DIRECTORY");
-  return folder != nullptr ? folder : "";
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   using namespace ignis::runtime;
-  std::string checkpoint_folder = supervised_folder();
+  std::string checkpoint_folder = supervised_folder("RUNTIME_DIRECTORY");
   return run_application(
       "lio_frontend", "LiDAR-inertial odometry: error-state Kalman filter with scan matching.", argc, argv,
       [&](CLI::App& app) {

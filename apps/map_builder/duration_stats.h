@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -33,5 +34,14 @@ class DurationStats {
   std::int64_t count_ = 0;
   double max_ = 0.0;
 };
+
+/// Runs `work` and adds the wall time that it took.
+template <class Work>
+auto timed(DurationStats& stats, Work&& work) {
+  const auto began = std::chrono::steady_clock::now();
+  auto result = work();
+  stats.add(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count());
+  return result;
+}
 
 }  // namespace ignis

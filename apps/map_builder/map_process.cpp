@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <format>
+#include <iostream>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -33,32 +34,16 @@ constexpr int kHealthQueue = 100;
 
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-/// Runs `work` and adds the wall time that it took.
-template <class Work>
-auto timed(DurationStats& stats, Work&& work) {
-  const auto began = std::chrono::steady_clock::now();
-  auto result = work();
-  stats.add(1e3 * seconds(std::chrono::steady_clock::now() - began));
-  return result;
-}
-
 SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
-
-StreamTerms stream_terms(const MapConfig& map, const runtime::HmiConfig& hmi) {
-  return {.server_version = runtime::version(),
-          .cell_m = {map.local_cell_m, map.mid_cell_m, map.coarse_cell_m},
-          .window_m = {map.local_window_m, map.mid_window_m, map.coarse_window_m},
-          .max_view_radius_m = hmi.max_view_radius_m,
-          .frame_rate_hz = hmi.frame_rate_hz};
-}
 
 }  // namespace
 
-MapProcess::MapProcess(const runtime::Application& application, const runtime::HmiConfig& hmi)
+MapProcess::MapProcess(const runtime::Application& application, const runtime::HmiConfig& hmi,
+                       const std::filesystem::path& journal_folder)
     : map_config_(application.config.map),
       link_(application),
       server_(hmi, stream_terms(map_config_, hmi)),
-      map_(map_config_),
+      lasting_(map_config_, journal_folder),
       frame_period_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))) {
   hud_.map.address = server_.address();
@@ -72,9 +57,10 @@ void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
   remember(link_.subscribe<cloud_t>(channels::kCloud, lcm.cloud_queue, [this](const cloud_t& message) {
     if (const auto cloud = clouds_.add(message)) on_cloud(*cloud);
   }));
-  remember(link_.subscribe<keyframe_t>(channels::kKeyframe, parts, [this](const keyframe_t& message) {
+  keyframe_counts_ = &link_.subscribe<keyframe_t>(channels::kKeyframe, parts, [this](const keyframe_t& message) {
     if (const auto keyframe = keyframes_.add(message)) on_keyframe(*keyframe);
-  }));
+  });
+  remember(*keyframe_counts_);
   remember(link_.subscribe<smoothed_keyframes_t>(channels::kSmoothedKeyframes, parts,
                                                  [this](const smoothed_keyframes_t& message) {
                                                    if (const auto revision = revisions_.add(message)) {
@@ -94,21 +80,23 @@ void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
 
 bool MapProcess::accept_session(std::int32_t session) {
   if (session_ && session < *session_) return false;
-  if (session_ && session > *session_) {
-    // A new odom frame: nothing of the old map can be placed in it.
-    map_.clear();
-    loops_.clear();
-    graph_keyframes_ = 0;
-    request_counts_.clear();
-    hud_.loops_accepted = 0;
-    hud_.loops_withdrawn = 0;
-    ++resets_;
-    map_changed_ = loops_changed_ = keyframes_changed_ = true;
-    next_paths_ = {};
-    events_.session(hud_.map.utime, session);
-  }
+  if (session_ && session > *session_) begin_session(session);
   session_ = session;
   return true;
+}
+
+/// A new odom frame: nothing of the old map can be placed in it.
+void MapProcess::begin_session(std::int32_t session) {
+  lasting_.begin_session(session);
+  loops_.clear();
+  graph_keyframes_ = 0;
+  request_counts_.clear();
+  hud_.loops_accepted = 0;
+  hud_.loops_withdrawn = 0;
+  ++resets_;
+  map_changed_ = loops_changed_ = keyframes_changed_ = true;
+  next_paths_ = {};
+  events_.session(hud_.map.utime, session);
 }
 
 /// Looked at before the session is: what is damaged must not end the drive that is shown.
@@ -124,8 +112,11 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
     return;
   }
   if (!accept_session(cloud.session)) return;
-  const InsertCounts counts =
-      timed(budget_.insertion, [&] { return map_.insert_scan(cloud.points, cloud.T_odom_body); });
+  if (const std::string note = lasting_.begin_with(cloud); !note.empty()) {
+    std::cerr << "map_builder: " << note << std::endl;
+    keyframes_changed_ = true;
+  }
+  const InsertCounts counts = timed(budget_.insertion, [&] { return lasting_.insert_scan(cloud); });
   if (!cloud.points.empty() && counts.rejected == cloud.points.size()) {
     ++refused_clouds_;
     return;
@@ -137,8 +128,9 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
 
 void MapProcess::on_keyframe(const Keyframe& keyframe) {
   if (refuse_pose(keyframe.state.T_odom_body)) return;
-  if (!accept_session(keyframe.session) || map_.clouds().contains(keyframe.id)) return;
-  if (!map_.add_keyframe(keyframe)) return;
+  if (!accept_session(keyframe.session) || lasting_.waits_for_scan()) return;
+  if (lasting_.is_of_another_drive(keyframe)) begin_session(keyframe.session);
+  if (map_.clouds().contains(keyframe.id) || !lasting_.add_keyframe(keyframe)) return;
   events_.keyframe(keyframe.state.utime, keyframe.id);
   map_changed_ = keyframes_changed_ = true;
 }
@@ -345,6 +337,7 @@ void MapProcess::update_status() {
   hud_.map.revision = map_.revision();
   hud_.rebuilding = map_.rebuilding();
   hud_.state_age_s = seconds(Clock::now() - last_state_);
+  keyframe_counts_->queue_drops = keyframes_.incomplete();
   hud_.messages_lost = clouds_.incomplete() + keyframes_.incomplete() + revisions_.incomplete();
   hud_.messages_received = 0;
   for (const runtime::ReceiverCounts* receiver : receivers_) {
@@ -371,6 +364,9 @@ void MapProcess::report() {
   if (map_.voxels().coarsening() > 0) {
     state = health_t::DEGRADED;
     hud_.health = "DEGRADED: map.max_voxels is reached, the finest level is left out";
+  } else if (const std::string failure = lasting_.failure(); !failure.empty()) {
+    state = health_t::DEGRADED;
+    hud_.health = "DEGRADED: " + failure;
   } else if (const std::int64_t poses = refused_messages_ + map_.refused_poses(); refused_clouds_ + poses > 0) {
     state = health_t::DEGRADED;
     hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, poses);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <future>
 #include <map>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "map/picture_builder.h"
 #include "map_builder/event_feed.h"
 #include "map_builder/hud.h"
+#include "map_builder/lasting_map.h"
 #include "map_builder/loop_table.h"
 #include "map_builder/process_table.h"
 #include "map_builder/view_server.h"
@@ -24,7 +26,9 @@ namespace ignis {
 /// has its own thread, and so has a rebuild, whose result is taken over between two messages.
 class MapProcess {
  public:
-  MapProcess(const runtime::Application& application, const runtime::HmiConfig& hmi);
+  /// `journal_folder` may be empty: then a killed process begins with the keyframes alone.
+  MapProcess(const runtime::Application& application, const runtime::HmiConfig& hmi,
+             const std::filesystem::path& journal_folder);
 
   /// Serves until a stop is requested.
   void run();
@@ -37,6 +41,7 @@ class MapProcess {
 
   void subscribe(const runtime::LcmConfig& lcm);
   [[nodiscard]] bool accept_session(std::int32_t session);
+  void begin_session(std::int32_t session);
   [[nodiscard]] bool refuse_pose(const Pose& pose);
   void on_cloud(const messages::PosedCloud& cloud);
   void on_keyframe(const Keyframe& keyframe);
@@ -61,11 +66,13 @@ class MapProcess {
   MapConfig map_config_;
   runtime::LcmLink link_;
   ViewServer server_;
-  LiveMap map_;
+  LastingMap lasting_;
+  LiveMap& map_ = lasting_.live();
   messages::CloudAssembler clouds_;
   messages::KeyframeAssembler keyframes_;
   messages::RevisionAssembler revisions_;
   std::vector<const runtime::ReceiverCounts*> receivers_;
+  runtime::ReceiverCounts* keyframe_counts_ = nullptr;
   HudData hud_;
   MapBudget budget_;
   EventFeed events_;

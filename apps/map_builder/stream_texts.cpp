@@ -8,6 +8,7 @@
 
 #include "map/stream_encoding.h"
 #include "map/voxel_checksum.h"
+#include "runtime/application.h"
 
 namespace ignis {
 namespace {
@@ -47,6 +48,14 @@ std::optional<std::vector<const KeyframeList::Entry*>> changed_entries(const Key
 double in_millimetres(float metres) { return std::round(static_cast<double>(metres) * 1e3) / 1e3; }
 
 }  // namespace
+
+StreamTerms stream_terms(const MapConfig& map, const runtime::HmiConfig& hmi) {
+  return {.server_version = runtime::version(),
+          .cell_m = {map.local_cell_m, map.mid_cell_m, map.coarse_cell_m},
+          .window_m = {map.local_window_m, map.mid_window_m, map.coarse_window_m},
+          .max_view_radius_m = hmi.max_view_radius_m,
+          .frame_rate_hz = hmi.frame_rate_hz};
+}
 
 std::string hello_text(const StreamTerms& terms, std::int32_t session, std::int32_t revision) {
   return Json{{"type", "hello"},

@@ -6,7 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "map/map_config.h"
 #include "map_builder/view_board.h"
+#include "runtime/hmi_config.h"
 
 /// The JSON texts of the stream, as docs/wire_format.md lists them; hud.h and loop_table.h have the larger ones.
 namespace ignis {
@@ -19,6 +21,7 @@ struct StreamTerms {
   double max_view_radius_m = 0.0;
   double frame_rate_hz = 0.0;
 };
+[[nodiscard]] StreamTerms stream_terms(const MapConfig& map, const runtime::HmiConfig& hmi);
 
 [[nodiscard]] std::string hello_text(const StreamTerms& terms, std::int32_t session, std::int32_t revision);
 

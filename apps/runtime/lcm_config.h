@@ -12,8 +12,8 @@ struct LcmConfig {
   int imu_queue = 5000;
   int scan_queue = 400;
   int keyframe_queue = 5000;
-  int cloud_queue = 40;
-  int state_queue = 50;
+  int cloud_queue = 100;
+  int state_queue = 500;
 
   void visit_fields(this auto& self, auto& visit) {
     visit.text("url", self.url, "LCM URL of the bus; ttl=0 never leaves the host, and recv_buf_size must be given");
@@ -21,8 +21,10 @@ struct LcmConfig {
     visit.integer("scan_queue", self.scan_queue, {1, 100000}, "messages", "queue of L1_SCAN, in parts");
     visit.integer("keyframe_queue", self.keyframe_queue, {10, 100000}, "messages",
                   "queue of the keyframe channels; map_builder 300 at most");
-    visit.integer("cloud_queue", self.cloud_queue, {1, 10000}, "messages", "queue of LIO_CLOUD, in parts");
-    visit.integer("state_queue", self.state_queue, {1, 10000}, "messages", "queue of states that are only shown");
+    visit.integer("cloud_queue", self.cloud_queue, {1, 10000}, "messages",
+                  "queue of LIO_CLOUD, in parts; 100 are 5 s of an L1");
+    visit.integer("state_queue", self.state_queue, {1, 10000}, "messages",
+                  "queue of states that are only shown; 500 are 2 s");
   }
 };
 

@@ -72,8 +72,10 @@ void LcmLink::on_message(const lcm::ReceiveBuffer* buffer, const std::string&, R
 }
 
 void LcmLink::take(std::span<const std::byte> data, Receiver& receiver) {
+  std::string problem;
   try {
-    if (receiver.deliver(data)) {
+    problem = receiver.deliver(data);
+    if (problem.empty()) {
       receiver.refusals.taken(uptime_s());
       return;
     }
@@ -83,7 +85,7 @@ void LcmLink::take(std::span<const std::byte> data, Receiver& receiver) {
     return;
   }
   const std::string foreign = Refusals::foreign_type(data, receiver.type);
-  refuse(receiver, foreign.empty() ? "its length or its stamp is impossible" : foreign, !foreign.empty());
+  refuse(receiver, foreign.empty() ? problem : foreign, !foreign.empty());
 }
 
 void LcmLink::refuse(Receiver& receiver, const std::string& reason, bool is_foreign) {

@@ -12,6 +12,7 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "messages/length_check.h"
+#include "messages/part_assembler.h"
 #include "runtime/application.h"
 #include "runtime/budget_watch.h"
 #include "runtime/bus_socket.h"
@@ -55,13 +56,17 @@ class LcmLink {
     Receiver& receiver = receivers_.emplace_back();
     receiver.counts.channel = channel;
     receiver.type = Message::getHash();
-    receiver.deliver = [&receiver, handler = std::move(handler), senders](std::span<const std::byte> data) {
+    receiver.deliver = [&receiver, handler = std::move(handler),
+                        senders](std::span<const std::byte> data) -> const char* {
       Message message;
-      if (!messages::decode_checked(data, message)) return false;
+      if (!messages::decode_checked(data, message)) return "its length or its stamp is impossible";
+      if constexpr (requires { message.part_count; }) {
+        if (!messages::numbering_is_possible(message)) return "its part number or its number of parts is impossible";
+      }
       ++receiver.counts.received;
       if (senders == Senders::kOne) receiver.counts.lost += receiver.sequence.observe(message.sequence);
       handler(message);
-      return true;
+      return "";
     };
     subscribe_raw(receiver, queue_capacity);
     return receiver.counts;
@@ -88,8 +93,8 @@ class LcmLink {
     ReceiverCounts counts;
     SequenceTracker sequence;
     Refusals refusals;
-    std::int64_t type = 0;                                    ///< fingerprint of the messages that belong here
-    std::function<bool(std::span<const std::byte>)> deliver;  ///< false: not well-formed
+    std::int64_t type = 0;                                           ///< fingerprint of the messages that belong here
+    std::function<const char*(std::span<const std::byte>)> deliver;  ///< why it was refused; empty when it was not
     LcmLink* link = nullptr;
   };
 

@@ -35,8 +35,8 @@ done
 case $deaths in 0 | 1 | 2 | 3) pause=0 ;; 4) pause=2 ;; 5) pause=5 ;; *) pause=10 ;; esac
 if [ $pause -gt 0 ]; then
   echo "ended $deaths times within a minute, at last with $(s6-svdt . | tail -n 1 | cut -c27-); next start in $pause s"
+  trap 'kill $!; exit' TERM
   sleep $pause &
-  trap "kill $!; exit" TERM
   wait $!
   trap - TERM
 fi"""
@@ -59,7 +59,7 @@ class Supervisor(Protocol):
 
 
 def default_state_folder() -> Path:
-    """Where s6, logs, the back end's journal and the front end's checkpoint live."""
+    """Where s6, logs, the journals of back end and map and the front end's checkpoint live."""
     base = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     return Path(os.environ.get("IGNIS_STATE") or f"{base}/ignis")
 
@@ -97,6 +97,8 @@ def choose_supervisor(
             commands["map_builder"] += ["--port", str(view_port)]
         if "graph_backend" in commands:
             commands["graph_backend"] += ["--journal", str(state / "journal")]
+        if "map_builder" in commands:
+            commands["map_builder"] += ["--journal", str(state / "map")]
         if "lio_frontend" in commands:
             commands["lio_frontend"] += ["--checkpoint", str(state / "checkpoint")]
     return S6Supervisor(state, commands, {"LCM_DEFAULT_URL": url} if url else {})

@@ -21,8 +21,7 @@ CellIndex cell_of(const Eigen::Vector3d& p, double per_metre) {
 
 /// A point as the map can order it, or nothing: coordinates that it can hold, an intensity that is a number.
 std::optional<CloudPoint> sound(const Eigen::Vector3d& p, float intensity) {
-  // Also false for what is not a number.
-  if (!(p.cwiseAbs().maxCoeff() < kMaxCoordinate)) return std::nullopt;
+  if (!is_within_reach(p)) return std::nullopt;
   return CloudPoint{p.cast<float>(), intensity > 0.0F ? std::min(intensity, 255.0F) : 0.0F};
 }
 
@@ -86,41 +85,47 @@ KeyframeClouds::Kept KeyframeClouds::add_keyframe(std::int32_t id, std::span<con
   if (is_newest) {
     close_newest();
     entries_[id] = {T_odom_keyframe, nullptr};
-    return {id, insert_open(points_body, Pose{}, false)};
+    return insert_open(points_body, Pose{}, false);
   }
   auto cloud = std::make_shared<CloudData>();
-  for (const CloudPoint& point : points_body) {
-    if (const auto kept = sound(point.position.cast<double>(), point.intensity)) cloud->points.push_back(*kept);
+  which_.clear();
+  for (std::uint32_t i = 0; i < points_body.size(); ++i) {
+    const auto kept = sound(points_body[i].position.cast<double>(), points_body[i].intensity);
+    if (!kept) continue;
+    cloud->points.push_back(*kept);
+    which_.push_back(i);
   }
   sort_into_blocks(*cloud);
   closed_points_ += cloud->points.size();
   blocks_ += cloud->blocks.size();
   const std::span<const CloudPoint> kept = cloud->points;
   entries_[id] = {T_odom_keyframe, std::move(cloud)};
-  return {id, kept};
+  return {id, kept, which_};
 }
 
 KeyframeClouds::Kept KeyframeClouds::add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
   if (entries_.empty()) entries_[kBeforeFirst] = {T_odom_body, nullptr};
-  const auto& [id, entry] = *entries_.rbegin();
-  return {id, insert_open(points_body, entry.T_odom_keyframe.inverse() * T_odom_body, true)};
+  return insert_open(points_body, entries_.rbegin()->second.T_odom_keyframe.inverse() * T_odom_body, true);
 }
 
-std::span<const CloudPoint> KeyframeClouds::insert_open(std::span<const CloudPoint> points,
-                                                        const Pose& T_keyframe_points, bool are_rays) {
+KeyframeClouds::Kept KeyframeClouds::insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points,
+                                                 bool are_rays) {
   const std::size_t before = open_points_.size();
   const Eigen::Matrix3d R = T_keyframe_points.rotation.normalized().toRotationMatrix();
   const double per_metre = 1.0 / cell_m_;
-  for (const CloudPoint& point : points) {
-    const Eigen::Vector3d p = R * point.position.cast<double>() + T_keyframe_points.translation;
-    const auto kept = sound(p, point.intensity);
+  which_.clear();
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p = R * points[i].position.cast<double>() + T_keyframe_points.translation;
+    const auto kept = sound(p, points[i].intensity);
     if (!kept) continue;
     // The sensor stands near the body's origin; the few centimetres between are less than a cell.
     if (open_free_ && are_rays) open_free_->add_ray(T_keyframe_points.translation, p);
     if (open_free_ && !are_rays) open_free_->add_hit(p);
-    if (open_points_.size() < max_points_ && open_cells_.insert(cell_of(p, per_metre))) open_points_.push_back(*kept);
+    if (open_points_.size() >= max_points_ || !open_cells_.insert(cell_of(p, per_metre))) continue;
+    open_points_.push_back(*kept);
+    which_.push_back(i);
   }
-  return std::span(open_points_).subspan(before);
+  return {entries_.rbegin()->first, std::span(open_points_).subspan(before), which_};
 }
 
 void KeyframeClouds::close_newest() {

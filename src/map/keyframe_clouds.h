@@ -35,6 +35,7 @@ class KeyframeClouds {
   struct Kept {
     std::int32_t id = 0;
     std::span<const CloudPoint> points;
+    std::span<const std::uint32_t> which;  ///< their places among the points that were offered
   };
 
   KeyframeClouds(double cell_m, std::size_t max_points);
@@ -78,14 +79,14 @@ class KeyframeClouds {
     SharedCloud cloud;  // none while open
   };
 
-  std::span<const CloudPoint> insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points,
-                                          bool are_rays);
+  Kept insert_open(std::span<const CloudPoint> points, const Pose& T_keyframe_points, bool are_rays);
   void close_newest();
 
   double cell_m_;
   std::size_t max_points_;
   std::map<std::int32_t, Entry> entries_;
   std::vector<CloudPoint> open_points_;
+  std::vector<std::uint32_t> which_;  // of Kept
   CellSet open_cells_;
   std::optional<FreeSpace> open_free_;
   std::size_t blocks_ = 0;  // of the closed ones, as are the free cells

@@ -37,6 +37,7 @@ ThreeLevelMap::CloudLookup LiveMap::lookup() const {
 }
 
 InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
+  newest_kept_ = {};
   if (!usable(T_odom_body) || !usable(T_map_odom_ * T_odom_body)) {
     ++refused_poses_;
     return {.rejected = points_body.size()};
@@ -45,6 +46,7 @@ InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const
   path_.add(T_odom_body.translation, nodes_.empty() ? KeyframeClouds::kBeforeFirst : nodes_.rbegin()->first);
   map_.follow(T_map_body().translation, lookup());
   const KeyframeClouds::Kept kept = clouds_.add_scan(points_body, T_odom_body);
+  newest_kept_ = kept.which;
   InsertCounts counts = show(kept);
   counts.known = points_body.size() - kept.points.size();
   drop_far_clouds();
@@ -52,6 +54,7 @@ InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const
 }
 
 bool LiveMap::add_keyframe(const Keyframe& keyframe) {
+  newest_kept_ = {};
   const Pose& T_odom_keyframe = keyframe.state.T_odom_body;
   if (keyframe.id < 0 || !usable(T_odom_keyframe) || !usable(T_map_odom_ * T_odom_keyframe)) {
     ++refused_poses_;
@@ -62,7 +65,9 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   node.has_cloud = true;
   node.T_odom_keyframe = T_odom_keyframe;
   if (!node.corrected) node.T_map_keyframe = T_map_odom_ * T_odom_keyframe;
-  show(clouds_.add_keyframe(keyframe.id, keyframe.cloud, T_odom_keyframe));
+  const KeyframeClouds::Kept kept = clouds_.add_keyframe(keyframe.id, keyframe.cloud, T_odom_keyframe);
+  newest_kept_ = kept.which;
+  show(kept);
   cast_votes();
   drop_far_clouds();
   settle();  // the first keyframe tells where what came before belongs

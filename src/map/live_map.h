@@ -65,6 +65,11 @@ class LiveMap {
   /// A keyframe; known ids are ignored. False when its pose is unusable.
   bool add_keyframe(const Keyframe& keyframe);
 
+  /// Which points of the newest scan or keyframe say something new. The same calls with these points alone make the
+  /// same map, unless it carves: then every ray counts. Valid until the next call.
+  [[nodiscard]] std::span<const std::uint32_t> newest_kept() const { return newest_kept_; }
+  [[nodiscard]] bool follows_rays() const { return config_.carve_free_space; }
+
   /// The back end's newest state: poses that moved and the correction of odom. Poses that no map can hold are ignored
   /// and counted.
   void correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision = 0);
@@ -141,6 +146,7 @@ class LiveMap {
   bool drawing_ = true;
   bool needs_rebuild_ = false;
   bool rebuilding_ = false;
+  std::span<const std::uint32_t> newest_kept_;
   std::vector<Arrival> arrivals_;  // since the rebuild under way began
   int rebuilds_ = 0;
   std::int64_t reanchored_ = 0;

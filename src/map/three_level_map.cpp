@@ -37,7 +37,7 @@ std::array<double, kLevels> window_radii(const MapConfig& config, int coarsening
 
 bool usable(const Pose& T_world_body) {
   return T_world_body.all_finite() && std::abs(T_world_body.rotation.norm() - 1.0) < kMaxNormError &&
-         T_world_body.translation.cwiseAbs().maxCoeff() < kMaxCoordinate;
+         is_within_reach(T_world_body.translation);
 }
 
 ThreeLevelMap::ThreeLevelMap(const MapConfig& config)
@@ -52,8 +52,7 @@ void ThreeLevelMap::for_each_placed(const Pose& T_world_cloud, std::span<const C
   const Eigen::Matrix3d R = T_world_cloud.rotation.normalized().toRotationMatrix();
   for (const CloudPoint& point : points) {
     const Eigen::Vector3d p_world = R * point.position.cast<double>() + T_world_cloud.translation;
-    // Also false for what is not a number.
-    if (!(p_world.cwiseAbs().maxCoeff() < kMaxCoordinate)) continue;
+    if (!is_within_reach(p_world)) continue;
     visit(point, locator_.locate(p_world));
   }
 }
@@ -169,7 +168,7 @@ void ThreeLevelMap::count_votes(const Cloud& cloud, std::span<const FreeCell> fr
   Tile* tile = nullptr;
   for (const FreeCell cell : free) {
     const Eigen::Vector3d p_world = cloud.T_world_cloud * grid_.centre_of(1, unpack_free_cell(cell));
-    if (!(p_world.cwiseAbs().maxCoeff() < kMaxCoordinate)) continue;
+    if (!is_within_reach(p_world)) continue;
     const Location location = locator_.locate(p_world);
     if (tile == nullptr || tile->index() != location.tile) tile = &tile_of(pack(location.tile), location.tile);
     if (tile->votes.empty()) tile->votes.resize(cells * cells * cells);

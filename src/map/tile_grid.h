@@ -19,6 +19,10 @@ inline constexpr std::size_t kLevels = 3;  ///< fine to coarse: local, mid, coar
 /// Coordinates beyond this cannot be told apart [m]; whoever inserts points refuses them.
 inline constexpr double kMaxCoordinate = 10'000.0;
 
+/// Whether a map can hold the point. Not by the largest coordinate: which one that is, is undefined when one is no
+/// number.
+[[nodiscard]] inline bool is_within_reach(const Eigen::Vector3d& p) { return (p.array().abs() < kMaxCoordinate).all(); }
+
 /// How the world is cut: cells of three sizes that nest, and tiles, cubes that hold a whole number of cells of every
 /// level. A cell within its tile is numbered with x slowest and z fastest.
 struct TileGrid {

@@ -56,12 +56,18 @@ class Seen:
 class FaultRun:
     """The front end, the back end and the map, and a listener that may also send. A context manager."""
 
-    def __init__(self, folder: Path, names: tuple[str, ...] = ("map_builder", "graph_backend", "lio_frontend")) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        names: tuple[str, ...] = ("map_builder", "graph_backend", "lio_frontend"),
+        map_options: tuple[str | Path, ...] = (),
+    ) -> None:
         self.seen = Seen()
         self.hostile: set[int] = set()  # hashes of what the tests themselves have sent
         self.pipeline = Pipeline(folder, BUS)
         self.bus = lcm.LCM(BUS)
         self._names = names
+        self._map_options = ("--port", PORT, *map_options)
         for channel, take in {
             "LIO_KEYFRAME": self._on_keyframe,
             "SMOOTHED_KEYFRAMES": self._on_revision,
@@ -73,8 +79,7 @@ class FaultRun:
 
     def __enter__(self) -> FaultRun:
         for name in self._names:
-            more = ("--port", PORT) if name == "map_builder" else ()
-            self.pipeline.start(name, "--config", CONFIG, *more)
+            self._start(name)
         self.listen(1.0)
         wanted = set(self._names)
         deadline = time.monotonic() + 20.0
@@ -82,6 +87,15 @@ class FaultRun:
             assert time.monotonic() < deadline, f"only {set(self.seen.health)} spoke"
             self.listen(0.1)
         return self
+
+    def _start(self, name: str) -> None:
+        self.pipeline.start(name, "--config", CONFIG, *(self._map_options if name == "map_builder" else ()))
+
+    def kill_and_restart(self, name: str) -> None:
+        """Kills a process and starts it again at once."""
+        self.pipeline.processes[name].kill()
+        self.pipeline.processes[name].wait()
+        self._start(name)
 
     def __exit__(self, *_: object) -> None:
         self.pipeline.stop(*reversed(self.pipeline.processes))

@@ -132,6 +132,22 @@ TEST(KeyframeClouds, LeavesOutPointsThatNoMapCanHoldAndMendsIntensities) {
   EXPECT_EQ(clouds.view(0).points[2].intensity, 0.0F);
 }
 
+TEST(KeyframeClouds, LeavesOutWhatIsNoNumberWhicheverCoordinateAndHoweverLateItComes) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float bad : {nan, infinity}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      CloudPoint point{{1.0F, 2.0F, 3.0F}, 1.0F};
+      point.position[axis] = bad;
+      KeyframeClouds clouds(kCell, 1'000'000);
+      clouds.add_keyframe(1, std::span(&point, 1), Pose{});
+      clouds.add_scan(std::span(&point, 1), Pose{});
+      clouds.add_keyframe(0, std::span(&point, 1), Pose{});  // late
+      EXPECT_EQ(clouds.points(), 0U) << bad << " in axis " << axis;
+    }
+  }
+}
+
 TEST(KeyframeClouds, SaysWhatTheRaysOfItsScansFoundFree) {
   KeyframeClouds clouds(kCell, 1'000'000);
   clouds.follow_rays(FreeSpace(0.25, 3));

@@ -38,6 +38,7 @@ class Drive:
         self.step = 0
         self.drift = drift
         self.keyframes = []
+        self.last_keyframe_stamp = 0
 
     def position(self):
         return np.array([self.drift * self.step, 0.0, -SPEED * SCAN_PERIOD * self.step])
@@ -80,7 +81,9 @@ class Drive:
     def publish_keyframe(self, position, scan):
         keyframe = types.keyframe_t()
         keyframe.id = keyframe.sequence = len(self.keyframes)
-        keyframe.utime = keyframe.previous_utime = self.stamp()
+        keyframe.utime = self.stamp()
+        keyframe.previous_utime = self.last_keyframe_stamp if self.keyframes else keyframe.utime
+        self.last_keyframe_stamp = keyframe.utime
         keyframe.part_count, keyframe.imu_complete, keyframe.resolution = 1, 1, 0.001
         keyframe.position, keyframe.quaternion = list(position), [1.0, 0.0, 0.0, 0.0]
         keyframe.num_points = len(scan)

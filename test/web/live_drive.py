@@ -37,6 +37,7 @@ class LiveDrive:
         self.statuses: list[dict[str, Any]] = []
         self.vehicle: list[list[float]] = []
         self.alarms: list[str] = []
+        self.loops: list[dict[str, Any]] = []  # as the page knew them at the last look
         self.next_status = self.next_screenshot = 0.0
         self.before_loop = folder / "before_loop.png"
         self.after_loop = folder / "after_loop.png"
@@ -86,6 +87,7 @@ class LiveDrive:
         self.figures.append((hud, texts))
         self.applied.update({entry["sequence"]: entry for entry in applied})
         self.vehicle.append(vehicle)
+        self.loops = loops
         if not self.statuses or time.monotonic() > self.next_status:
             self.statuses.append(self.view.status())
             self.next_status = time.monotonic() + 1.0

@@ -86,6 +86,7 @@ def test_vehicle_stands_where_the_pose_says(drive: LiveDrive) -> None:
 
 
 def test_loop_is_seen_on_two_screenshots(drive: LiveDrive) -> None:
+    assert drive.after_loop.exists(), f"no loop came in; the page knew {drive.loops}, the server {drive.statuses[-1]}"
     before, after = imread(drive.before_loop), imread(drive.after_loop)
     assert before.shape == after.shape
     assert (np.abs(before - after).max(axis=2) > 0.1).mean() > 0.01

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_builder/lasting_map.h"
+
+#include <algorithm>
+#include <chrono>
+#include <format>
+#include <utility>
+
+#include "runtime/ignis_config.h"
+
+namespace ignis {
+namespace {
+
+constexpr double kLongestAbsence = 60.0;  // [s] of sensor time: six times the longest pause of a supervisor
+
+std::string fingerprint_of(const MapConfig& config) {
+  runtime::IgnisConfig deciding;
+  deciding.map = config;
+  return runtime::config_hash(deciding);
+}
+
+}  // namespace
+
+LastingMap::LastingMap(const MapConfig& config, const std::filesystem::path& folder)
+    : fingerprint_(fingerprint_of(config)),
+      map_(config),
+      journal_(folder.empty() ? nullptr : std::make_unique<MapJournal>(folder)) {
+  if (journal_) loaded_ = journal_->load(fingerprint_);
+}
+
+void LastingMap::begin_journal(std::int32_t session) {
+  if (!journal_ || session_ == session) return;
+  session_ = session;
+  journal_->begin({.config_fingerprint = fingerprint_, .session = session});
+}
+
+std::string LastingMap::begin_with(const messages::PosedCloud& cloud) {
+  if (!loaded_) return {};
+  const auto began = std::chrono::steady_clock::now();
+  MapJournal::Loaded loaded = *std::exchange(loaded_, std::nullopt);
+  const double absence =
+      seconds_between(std::ranges::max_element(loaded.records, {}, &MapRecord::utime)->utime, cloud.utime);
+  if (loaded.head.session != cloud.session || !(absence > 0.0 && absence < kLongestAbsence)) {
+    begin_session(cloud.session);
+    return "the journal is of another drive; the map begins anew";
+  }
+  journal_->resume(loaded.head);
+  session_ = loaded.head.session;
+  for (const MapRecord& record : loaded.records) {
+    if (record.is_keyframe) restored_[record.id] = record.utime;
+  }
+  restore(map_, std::move(loaded.records));
+  note_drops();
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
+  return std::format("goes on with {} keyframes, {} voxels after {:.1f} s, built in {:.2f} s{}{}", map_.clouds().size(),
+                     map_.voxels().size(), absence, spent.count(),
+                     loaded.damage.empty() ? "" : "; not whole: ", loaded.damage);
+}
+
+void LastingMap::begin_session(std::int32_t session) {
+  map_.clear();
+  loaded_.reset();
+  restored_.clear();
+  session_.reset();  // the journal of this session may be that of another drive
+  begin_journal(session);
+}
+
+InsertCounts LastingMap::insert_scan(const messages::PosedCloud& cloud) {
+  const InsertCounts counts = map_.insert_scan(cloud.points, cloud.T_odom_body);
+  if (!journal_) return counts;
+  begin_journal(cloud.session);
+  if (const auto record = record_of_scan(map_, cloud.points, cloud.utime, cloud.T_odom_body)) journal_->append(*record);
+  note_drops();
+  return counts;
+}
+
+bool LastingMap::add_keyframe(const Keyframe& keyframe) {
+  if (!map_.add_keyframe(keyframe)) return false;
+  if (!journal_) return true;
+  begin_journal(keyframe.session);
+  journal_->append(record_of_keyframe(map_, keyframe));
+  note_drops();
+  return true;
+}
+
+bool LastingMap::is_of_another_drive(const Keyframe& keyframe) {
+  const auto same = restored_.find(keyframe.id);
+  const auto previous = restored_.find(keyframe.id - 1);
+  if (same == restored_.end() && previous == restored_.end()) return false;
+  const bool fits =
+      same != restored_.end() ? same->second == keyframe.state.utime : previous->second == keyframe.previous_utime;
+  restored_.clear();
+  return !fits;
+}
+
+void LastingMap::note_drops() {
+  if (std::exchange(dropped_, map_.clouds().dropped()) != dropped_) journal_->forget_dropped(map_.clouds());
+}
+
+}  // namespace ignis

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "map/live_map.h"
+#include "map_builder/map_journal.h"
+#include "messages/odometry_messages.h"
+
+namespace ignis {
+
+/// The map of the present drive and, when a folder is given, its journal: a process that was killed is succeeded by one
+/// with the same clouds.
+///
+/// Session numbers begin at 0 in every drive, so the journal is used only when the first scan that arrives follows its
+/// newest within a minute; and a keyframe that contradicts it afterwards is of another drive.
+class LastingMap {
+ public:
+  /// Reads what is in `folder`; empty: without a journal. Throws runtime::UserError when the folder cannot be used.
+  LastingMap(const MapConfig& config, const std::filesystem::path& folder);
+
+  [[nodiscard]] LiveMap& live() { return map_; }
+
+  /// A journal waits for a scan that tells whether it is of this drive: keyframes come too early.
+  [[nodiscard]] bool waits_for_scan() const { return loaded_.has_value(); }
+
+  /// Goes on with the journal that waits, or begins a new one. What became of it, for people; empty when none waited.
+  std::string begin_with(const messages::PosedCloud& cloud);
+
+  /// Forgets everything: the keyframes and scans of another session or drive follow.
+  void begin_session(std::int32_t session);
+
+  InsertCounts insert_scan(const messages::PosedCloud& cloud);
+  bool add_keyframe(const Keyframe& keyframe);
+
+  /// Whether a keyframe shows that the journal was gone on with by mistake.
+  [[nodiscard]] bool is_of_another_drive(const Keyframe& keyframe);
+
+  /// Why the map is not in the journal; empty while all is well, and without a journal.
+  [[nodiscard]] std::string failure() const { return journal_ ? journal_->failure() : ""; }
+
+ private:
+  void begin_journal(std::int32_t session);
+  void note_drops();
+
+  std::string fingerprint_;
+  LiveMap map_;
+  std::unique_ptr<MapJournal> journal_;
+  std::optional<MapJournal::Loaded> loaded_;
+  std::optional<std::int32_t> session_;     ///< of the journal that is being written
+  std::map<std::int32_t, Utime> restored_;  ///< [us] stamps of keyframes, until one that arrives has confirmed them
+  std::int64_t dropped_ = 0;
+};
+
+}  // namespace ignis

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_builder/map_journal.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <format>
+#include <iterator>
+#include <utility>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "common/byte_record.h"
+#include "common/file_input.h"
+
+namespace ignis {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPrefix = "map_keyframe_";
+
+std::vector<fs::path> files_of(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().filename().string().starts_with(kPrefix)) paths.push_back(entry.path());
+  }
+  return paths;
+}
+
+void remove_file(const fs::path& path) {
+  std::error_code error;
+  fs::remove(path, error);
+}
+
+}  // namespace
+
+MapJournal::MapJournal(fs::path folder) : folder_(std::move(folder), "map_builder", "journal") {}
+
+MapJournal::~MapJournal() { close_file(); }
+
+MapJournal::File MapJournal::read(const fs::path& path) {
+  const std::vector<std::byte> bytes = read_bytes(path);
+  File file;
+  bool has_head = false;
+  while (file.whole_bytes < bytes.size() && file.damage.empty()) {
+    const RecordAt at = record_at(bytes, file.whole_bytes);
+    if (!at.damage.empty()) {
+      file.damage = at.damage;
+    } else if (!has_head) {
+      const auto head = decode_head(at.payload);
+      has_head = head.has_value();
+      if (has_head) file.head = *head;
+      if (!has_head) file.damage = "no head";
+    } else if (auto record = decode_record(at.payload)) {
+      file.records.push_back(std::move(*record));
+    } else {
+      file.damage = "a record that is none";
+    }
+    if (file.damage.empty()) file.whole_bytes += kRecordFrameBytes + at.payload.size();
+  }
+  if (!file.damage.empty()) file.damage = std::format("{}: {}", path.filename().string(), file.damage);
+  return file;
+}
+
+std::optional<MapJournal::Loaded> MapJournal::load(const std::string& config_fingerprint) {
+  std::optional<Loaded> loaded;
+  for (const fs::path& path : files_of(folder_.path())) {
+    File file = read(path);
+    const MapRecordHead here{kMapRecordVersion, config_fingerprint, file.head.session};
+    if (file.records.empty() || file.head != here) continue;
+    if (!loaded || loaded->head.session < here.session) {
+      loaded = Loaded{.head = here, .records = {}, .damage = {}};
+      sizes_.clear();
+    }
+    if (loaded->head != here) continue;
+    sizes_[file.records.front().id] = file.whole_bytes;
+    std::ranges::move(file.records, std::back_inserter(loaded->records));
+    if (!file.damage.empty()) loaded->damage = file.damage;
+  }
+  return loaded;
+}
+
+void MapJournal::begin(const MapRecordHead& head) {
+  sizes_.clear();
+  resume(head);
+}
+
+void MapJournal::resume(const MapRecordHead& head) {
+  close_file();
+  head_ = head;
+  failure_.clear();
+  for (const fs::path& path : files_of(folder_.path())) {
+    const auto known = std::ranges::find_if(sizes_, [&](const auto& each) { return path_of(each.first) == path; });
+    if (known == sizes_.end()) {
+      remove_file(path);
+    } else if (::truncate(path.c_str(), static_cast<off_t>(known->second)) != 0) {
+      fail("cannot be cut", errno);
+    }
+  }
+}
+
+fs::path MapJournal::path_of(std::int32_t id) const { return folder_.path() / std::format("{}{}", kPrefix, id); }
+
+void MapJournal::close_file() {
+  if (file_ >= 0) close(file_);
+  file_ = -1;
+}
+
+void MapJournal::open_for(std::int32_t id) {
+  if (file_ >= 0 && file_id_ == id) return;
+  close_file();
+  file_id_ = id;
+  file_ = ::open(path_of(id).c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0644);
+  if (file_ < 0) fail("cannot be opened", errno);
+}
+
+void MapJournal::append(const MapRecord& record) {
+  open_for(record.id);
+  if (file_ < 0) return;
+  std::vector<std::byte> bytes;
+  if (sizes_[record.id] == 0) bytes = encode_record(encode(head_));
+  std::ranges::copy(encode_record(encode(record)), std::back_inserter(bytes));
+  write(bytes);
+}
+
+/// All of it or nothing.
+void MapJournal::write(const std::vector<std::byte>& bytes) {
+  std::size_t written = 0;
+  while (written < bytes.size()) {
+    const ssize_t count = ::write(file_, bytes.data() + written, bytes.size() - written);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error = errno;
+      static_cast<void>(ftruncate(file_, static_cast<off_t>(sizes_[file_id_])));
+      fail("cannot be written", error);
+      return;
+    }
+    written += static_cast<std::size_t>(count);
+  }
+  sizes_[file_id_] += written;
+  failure_.clear();
+}
+
+void MapJournal::forget_dropped(const KeyframeClouds& clouds) {
+  std::erase_if(sizes_, [&](const auto& each) {
+    if (clouds.contains(each.first)) return false;
+    if (file_id_ == each.first) close_file();
+    remove_file(path_of(each.first));
+    return true;
+  });
+}
+
+void MapJournal::fail(const std::string& what, int error) {
+  failure_ = std::format("the map's journal {}: {}", what, std::strerror(error));
+}
+
+}  // namespace ignis

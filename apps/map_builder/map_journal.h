@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "map/map_record.h"
+#include "runtime/state_folder.h"
+
+namespace ignis {
+
+/// What one map_builder leaves to its successor: DIR/map_keyframe_ID, a file for each keyframe with its record and
+/// those of the scans that followed it. Append-only, a checksum for each record. One process at a time may use a
+/// folder.
+///
+/// A record is handed to the kernel at once, so a killed process loses none; it is not synced, since after a power cut
+/// the drive is over. With a keyframe that the map has dropped its file goes, so the folder is bounded as the map is:
+/// 16 bytes a point. What cannot be written shows in failure(), and the map goes on without it.
+class MapJournal {
+ public:
+  struct Loaded {
+    MapRecordHead head;
+    std::vector<MapRecord> records;
+    std::string damage;  ///< of the last file that is not whole; empty when all are
+  };
+
+  /// Makes and locks the folder. Throws runtime::UserError that names folder and reason.
+  explicit MapJournal(std::filesystem::path folder);
+  ~MapJournal();
+  MapJournal(const MapJournal&) = delete;
+  MapJournal& operator=(const MapJournal&) = delete;
+
+  /// What an earlier process has left under this configuration: of its newest session every whole record.
+  [[nodiscard]] std::optional<Loaded> load(const std::string& config_fingerprint);
+
+  /// Begins anew; what was there goes.
+  void begin(const MapRecordHead& head);
+
+  /// Goes on behind what load() has found. What is damaged is cut off.
+  void resume(const MapRecordHead& head);
+
+  void append(const MapRecord& record);
+
+  /// Removes the files of keyframes that the map no longer holds.
+  void forget_dropped(const KeyframeClouds& clouds);
+
+  /// Why the newest record is not in its file; empty while all is well.
+  [[nodiscard]] const std::string& failure() const { return failure_; }
+
+ private:
+  struct File {
+    MapRecordHead head;
+    std::vector<MapRecord> records;
+    std::size_t whole_bytes = 0;
+    std::string damage;
+  };
+
+  [[nodiscard]] static File read(const std::filesystem::path& path);
+  [[nodiscard]] std::filesystem::path path_of(std::int32_t id) const;
+  void open_for(std::int32_t id);
+  void close_file();
+  void write(const std::vector<std::byte>& bytes);
+  void fail(const std::string& what, int error);
+
+  runtime::StateFolder folder_;
+  MapRecordHead head_;
+  std::map<std::int32_t, std::size_t> sizes_;  ///< of the whole records in the files
+  int file_ = -1;
+  std::int32_t file_id_ = 0;  ///< of the one that is open
+  std::string failure_;
+};
+
+}  // namespace ignis

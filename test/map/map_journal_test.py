@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows P4 and M4: a map that is killed and succeeded by one that reads its journal."""
+
+import json
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ignis.pipeline import binary
+from map_drive import URL, Drive
+from stream_server import Server
+
+STEPS = 130
+KILLS = (3, 40, 41, 97)  # before a scan: among them the first one after a keyframe and the one behind it
+PAUSE_S = 0.002  # between two scans
+
+
+class JournalledMap:
+    """A map_builder with a journal, and the drive that it is sent."""
+
+    def __init__(self, folder: Path, start: Callable[..., Server]) -> None:
+        self.folder, self.drive = folder, Drive()
+        self._start_server = start
+        self._started_at = 0
+        self.start()
+
+    def start(self) -> None:
+        options = ("--port", "0", "--journal", self.folder / "journal", "--out", self.folder / "out")
+        self.server = self._start_server(*map(str, options), url=URL)
+        self._started_at = self.drive.step
+
+    def drive_to(self, step: int) -> None:
+        while self.drive.step < step:
+            self.drive.advance()
+            time.sleep(PAUSE_S)
+        self.wait_for(lambda status: status.get("clouds_inserted") == self.drive.step - self._started_at)
+
+    def status(self) -> dict[str, Any]:
+        return json.loads(self.server.request("/api/status")[2])
+
+    def wait_for(self, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        deadline = time.monotonic() + 10.0
+        while not condition(status := self.status()):
+            assert time.monotonic() < deadline, status
+            time.sleep(0.05)
+        return status
+
+    def kill(self) -> None:
+        self.server.process.kill()
+        self.server.process.communicate()
+
+    def end(self) -> tuple[bytes, str]:
+        """The map in the end, and what the last process said."""
+        self.server.process.terminate()
+        _, said = self.server.process.communicate(timeout=10)
+        assert self.server.process.returncode == 0, said
+        return (self.folder / "out" / "map.pcd").read_bytes(), said
+
+    def files(self) -> list[Path]:
+        return sorted((self.folder / "journal").glob("map_keyframe_*"))
+
+
+@pytest.fixture
+def make_map(private_network, start_server, tmp_path: Path) -> Iterator[Callable[[str], JournalledMap]]:
+    made = []
+
+    def make(name: str = "map") -> JournalledMap:
+        made.append(JournalledMap(tmp_path / name, start_server))
+        return made[-1]
+
+    yield make
+    for each in made:
+        if each.server.process.poll() is None:
+            each.kill()
+
+
+def test_fault_p4_a_map_killed_between_scans_ends_equal_to_the_undisturbed_one_voxel_for_voxel(make_map) -> None:
+    maps = {}
+    for name, kills in (("undisturbed", ()), ("killed", KILLS)):
+        run = make_map(name)
+        for step in kills:
+            run.drive_to(step)
+            run.kill()
+            run.start()
+        run.drive_to(STEPS)
+        run.drive.publish_correction(1)
+        run.wait_for(lambda status: status.get("revision") == 1)
+        maps[name], said = run.end()
+        assert ("goes on with" in said) == bool(kills)
+    assert len(maps["killed"]) > 100_000
+    assert maps["killed"] == maps["undisturbed"]
+
+
+def test_fault_m4_a_damaged_journal_gives_what_is_whole_and_says_so(make_map) -> None:
+    run = make_map()
+    run.drive_to(90)
+    whole = run.status()
+    run.kill()
+    _, first, second, *_ = run.files()
+    damaged = bytearray(first.read_bytes())
+    damaged[len(damaged) // 2] ^= 0x10
+    first.write_bytes(damaged)
+    second.write_bytes(second.read_bytes()[:-7])
+    (run.folder / "journal" / "map_keyframe_77").write_bytes(b"nothing of ours" * 100)
+    run.start()
+    run.drive_to(91)
+    status = run.status()
+    assert status["keyframes"] == whole["keyframes"]
+    assert 0.5 * sum(whole["voxels"]) < sum(status["voxels"]) <= sum(whole["voxels"]) + 500
+    assert not (run.folder / "journal" / "map_keyframe_77").exists()
+    _, said = run.end()
+    assert "not whole: map_keyframe_" in said
+
+
+def test_a_journal_of_another_drive_is_not_gone_on_with(make_map) -> None:
+    run = make_map()
+    run.drive_to(60)
+    run.kill()
+    run.drive.step += 20 * 61  # more than a minute later
+    run.drive.keyframes.clear()
+    run.start()
+    run.drive_to(run.drive.step + 1)
+    assert run.status()["voxels"][0] < 1600, "those of one scan"
+    assert {file.name for file in run.files()} <= {"map_keyframe_-1", "map_keyframe_0"}
+    assert "another drive" in run.end()[1]
+
+
+def test_a_keyframe_that_contradicts_the_journal_begins_the_map_anew(make_map) -> None:
+    run = make_map()
+    run.drive_to(60)
+    run.kill()
+    run.drive.keyframes.clear()  # a front end that began at once, and in the same session as every front end
+    run.start()
+    run.drive_to(90)
+    assert run.drive.keyframes and run.status()["keyframes"] <= len(run.drive.keyframes) + 1
+    assert {file.name for file in run.files()} <= {"map_keyframe_-1", "map_keyframe_0", "map_keyframe_1"}
+
+
+def test_a_journal_that_cannot_be_written_is_told_and_the_map_goes_on(make_map) -> None:
+    run = make_map()
+    run.drive_to(30)
+    shutil.rmtree(run.folder / "journal")
+    run.drive_to(90)
+    status = run.wait_for(lambda status: "the map's journal cannot be opened" in status.get("health", ""))
+    assert status["keyframes"] >= 4
+    run.end()
+
+
+def test_a_second_map_refuses_the_same_journal(make_map) -> None:
+    run = make_map()
+    command = [binary("map_builder"), "--lcm-url", "memq://", "--port", "0", "--journal", run.folder / "journal"]
+    second = subprocess.run(command, capture_output=True, text=True, timeout=10)
+    assert second.returncode == 1 and "another map_builder uses the journal" in second.stderr
