@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 #include "common/compact_cloud.h"
 #include "messages/field_copy.h"
@@ -137,13 +139,18 @@ KeyframeAssembler::Open& KeyframeAssembler::open_for(const keyframe_t& part) {
   return open_.back();
 }
 
+std::size_t KeyframeAssembler::parts_waiting() const {
+  return std::transform_reduce(open_.begin(), open_.end(), std::size_t{0}, std::plus{},
+                               [](const Open& open) { return open.parts.waiting(); });
+}
+
 std::optional<Keyframe> KeyframeAssembler::add(const keyframe_t& part) {
   Open& open = open_for(part);
   const std::int64_t given_up = open.parts.incomplete();
   const std::optional<std::vector<keyframe_t>> parts = open.parts.add(part);
   incomplete_ += open.parts.incomplete() - given_up;
-  if (open.parts.empty()) open_.pop_back();
-  if (open_.size() > kMostOpen) {
+  if (open.parts.waiting() == 0) open_.pop_back();
+  while (open_.size() > kMostOpen || parts_waiting() > kMostParts) {
     open_.pop_front();
     ++incomplete_;
   }

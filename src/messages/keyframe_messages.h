@@ -18,13 +18,15 @@ namespace ignis::messages {
 [[nodiscard]] std::vector<keyframe_t> to_messages(const Keyframe& keyframe);
 
 /// Puts the parts of keyframes together again. A request is answered with up to 16 keyframes in one go, and where the
-/// network lets their parts overtake each other all of them are on their way at once.
+/// network lets their parts overtake each other all of them are on their way at once. Bounded: of more than 32
+/// keyframes or kMostParts parts that wait, the keyframe that has waited longest for its next part is given up.
 class KeyframeAssembler {
  public:
   /// A complete keyframe, or nothing yet.
   [[nodiscard]] std::optional<Keyframe> add(const keyframe_t& part);
-  /// Keyframes that were given up because a part never came.
+  /// Keyframes that were given up because a part never came, or not in time.
   [[nodiscard]] std::int64_t incomplete() const { return incomplete_; }
+  [[nodiscard]] std::size_t parts_waiting() const;
 
  private:
   struct Open {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -12,6 +13,15 @@ namespace ignis::messages {
 /// Most points in one message: five 4-byte arrays of this many stay below 60 kB, so a part is one datagram.
 inline constexpr std::int64_t kMaxPointsPerPart = 2900;
 
+/// Most parts of one sequence. A scan of 128 beams has 46 and a keyframe of theirs 12; a part is a datagram of at most
+/// 64 kB, so what waits for a part that never comes is at most 64 MB, whoever sends it.
+inline constexpr std::int16_t kMostParts = 1024;
+
+/// Whether a message can be the part that it says it is.
+[[nodiscard]] bool numbering_is_possible(const auto& part) {
+  return part.part_count >= 1 && part.part_count <= kMostParts && part.part >= 0 && part.part < part.part_count;
+}
+
 /// Collects the numbered parts of one sequence and hands them over, in order, when the last one is in. A part of a
 /// newer sequence ends the wait for the older one, which is then counted as incomplete. Parts of one sequence may
 /// arrive in any order and more than once.
@@ -20,7 +30,7 @@ class PartAssembler {
  public:
   /// The complete set of parts, or nothing yet. Parts with impossible numbering are ignored and counted as incomplete.
   std::optional<std::vector<Message>> add(const Message& part) {
-    if (part.part_count < 1 || part.part < 0 || part.part >= part.part_count) {
+    if (!numbering_is_possible(part)) {
       ++incomplete_;
       return std::nullopt;
     }
@@ -42,8 +52,8 @@ class PartAssembler {
     return complete;
   }
 
-  /// No part waits for others.
-  [[nodiscard]] bool empty() const { return parts_.empty(); }
+  /// Parts that wait for others.
+  [[nodiscard]] std::size_t waiting() const { return parts_.size(); }
 
   /// Sequences that were given up because a part never came.
   [[nodiscard]] std::int64_t incomplete() const { return incomplete_; }

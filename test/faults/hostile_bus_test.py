@@ -14,6 +14,7 @@ from hostile_messages import CHANNELS, altered_words, datagrams, malformed, send
 SEED = 20261122
 STATE_RATE = 250.0
 FLOOD = 1000  # messages at least
+MOST_PARTS = 1024  # of one message, src/messages/part_assembler.h
 
 
 def test_fault_b5_damaged_messages_leave_graph_and_keyframes_as_they_are(
@@ -87,6 +88,30 @@ def test_fault_b5_any_altered_word_is_survived_by_every_process(private_network,
         assert set(run.seen.health) == {"lio_frontend", "graph_backend", "map_builder"}
         for messages in run.seen.health.values():
             assert messages[-1].memory_mb < messages[-1].memory_limit_mb
+
+
+def test_fault_b5_keyframes_without_end_are_refused_by_name_or_held_in_part(private_network, tmp_path: Path) -> None:
+    part = types.keyframe_t()
+    part.session, part.quaternion, part.resolution = 1, [1.0, 0.0, 0.0, 0.0], 0.001
+    part.num_points = 8000
+    part.x = part.y = part.z = [1] * part.num_points
+    part.intensity = bytes(part.num_points)
+    receivers = ("graph_backend", "map_builder")
+    with FaultRun(tmp_path, receivers) as run:
+        run.listen(2.2)
+        before = {name: run.seen.health[name][-1].memory_mb for name in receivers}
+        for part.part in range(300):
+            for part.id, part.part_count in (*((id_, MOST_PARTS) for id_ in range(8)), (99, MOST_PARTS + 1)):
+                run.send("LIO_KEYFRAME", part.encode())
+            run.listen(0.01)
+        run.listen(2.2)
+        for name in receivers:
+            newest = run.seen.health[name][-1]
+            # 2,400 parts of 58 kB came that could have been honest: 140 MB. LCM's own buffer holds some as well.
+            assert newest.memory_mb - before[name] < 110.0, name
+            assert run.seen.rejected(name, "LIO_KEYFRAME") > 200, name
+            assert newest.queue_drops[newest.channels.index("LIO_KEYFRAME")] > 0, f"{name} gives up without a word"
+            assert "its part number or its number of parts is impossible" in newest.state_text
 
 
 def test_fault_b6_crafted_datagrams_end_no_process(private_network, tmp_path: Path) -> None:

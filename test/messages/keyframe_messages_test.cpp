@@ -115,6 +115,24 @@ TEST(KeyframeMessages, ThatStayIncompleteAreGivenUpInTheOrderOfTheirNewestPart) 
   EXPECT_TRUE(assembler.add(all[9].back()));
 }
 
+TEST(Fault_B5, KeyframesWithoutEndAreHeldInPart) {
+  KeyframeAssembler assembler;
+  const std::vector<keyframe_t> honest = to_messages(keyframe_of(10, 9000, 15.0F));
+  keyframe_t endless;
+  endless.part_count = kMostParts;
+  std::size_t most = 0;
+  for (endless.part = 0; endless.part < kMostParts - 1; ++endless.part) {
+    for (endless.id = 100; endless.id < 108; ++endless.id) {
+      EXPECT_FALSE(assembler.add(endless));
+      most = std::max(most, assembler.parts_waiting());
+    }
+  }
+  EXPECT_EQ(most, static_cast<std::size_t>(kMostParts));
+  EXPECT_GT(assembler.incomplete(), 7);
+  EXPECT_FALSE(assembler.add(honest.front()));
+  EXPECT_TRUE(assembler.add(honest.back())) << "the sound one has its place among them";
+}
+
 TEST(KeyframeMessages, OfTwoSessionsAreNotMixed) {
   const std::vector<keyframe_t> parts = to_messages(keyframe_of(10, 9000, 15.0F));
   ASSERT_EQ(parts.size(), 2U);

@@ -42,6 +42,17 @@ TEST(PartAssembler, RefusesImpossibleNumbering) {
   EXPECT_EQ(assembler.incomplete(), 3);
 }
 
+TEST(Fault_B5, ASequenceOfMorePartsThanAnyHonestOneIsRefused) {
+  PartAssembler<Part> assembler;
+  EXPECT_FALSE(assembler.add({1, 0, kMostParts}));
+  EXPECT_EQ(assembler.waiting(), 1U);
+  EXPECT_EQ(assembler.incomplete(), 0);
+  EXPECT_FALSE(assembler.add({2, 0, kMostParts + 1}));
+  EXPECT_EQ(assembler.incomplete(), 1);
+  EXPECT_FALSE(assembler.add({1, 1, kMostParts}));
+  EXPECT_EQ(assembler.waiting(), 2U) << "nor does it end the wait for another";
+}
+
 /// Counts how many of it live.
 struct CountedPart : Part {
   CountedPart(std::int32_t number, std::int16_t place, std::int16_t places) : Part{number, place, places} { ++alive; }
@@ -53,8 +64,8 @@ struct CountedPart : Part {
 
 TEST(Fault_B5, AnAnnouncedNumberOfPartsCostsNoMemory) {
   PartAssembler<CountedPart> assembler;
-  EXPECT_FALSE(assembler.add({1, 0, 32767}));
-  EXPECT_FALSE(assembler.add({1, 9, 32767}));
+  EXPECT_FALSE(assembler.add({1, 0, kMostParts}));
+  EXPECT_FALSE(assembler.add({1, 9, kMostParts}));
   EXPECT_EQ(CountedPart::alive, 2);
   static_assert(sizeof(PartAssembler<CountedPart>) < 100, "nothing is set aside for parts to come");
 }
