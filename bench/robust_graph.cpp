@@ -43,8 +43,8 @@ void require(const SolverOutcome& outcome) {
 void RobustGraph::add(const Keyframe& keyframe) {
   KeyframeLink link = first_link(keyframe, config_);
   if (!ends_.empty()) {
-    const End& last = ends_.back();
-    const LinkEnd previous{last.id, last.utime, last.T_odom_body, estimate_of(solver_, last.id)};
+    LinkEnd previous = ends_.back();
+    previous.estimate = estimate_of(solver_, previous.id);
     const WhiteningRows odometry = whitening_with_floor(config_.scan_information_scale * keyframe.scan_information,
                                                         config_.odometry_floor_rad, config_.odometry_floor_m);
     link = next_link(keyframe, previous, keyframe.imu_complete, odometry, config_);
@@ -54,7 +54,7 @@ void RobustGraph::add(const Keyframe& keyframe) {
   add_link_factors(link, config_, factors);
   insert_estimate(link.id, link.guess, values);
   require(solver_.add(factors, values));
-  ends_.push_back({keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body});
+  ends_.push_back({keyframe.id, keyframe.state, {}});
 }
 
 void RobustGraph::add(const LoopMeasurement& loop) {
@@ -69,7 +69,7 @@ void RobustGraph::add(const LoopMeasurement& loop) {
 std::vector<Pose> RobustGraph::poses() {
   const gtsam::Values& values = solver_.estimate();
   std::vector<Pose> poses;
-  for (const End& end : ends_) poses.push_back(from_gtsam(values.at<gtsam::Pose3>(X(end.id))));
+  for (const LinkEnd& end : ends_) poses.push_back(from_gtsam(values.at<gtsam::Pose3>(X(end.id))));
   return poses;
 }
 

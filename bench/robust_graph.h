@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "backend/keyframe_factors.h"
 #include "backend/smoother.h"
 
 namespace ignis::bench {
@@ -30,12 +31,7 @@ class RobustGraph {
   BackendConfig config_;
   Kernel kernel_;
   IncrementalSolver solver_;
-  struct End {
-    std::int32_t id;
-    Utime utime;
-    Pose T_odom_body;
-  };
-  std::vector<End> ends_;
+  std::vector<LinkEnd> ends_;  // without estimates
 };
 
 }  // namespace ignis::bench

@@ -36,8 +36,7 @@ void transfer(auto& io, FieldsOf<KeyframeLink> auto& link) {
 
 void transfer(auto& io, FieldsOf<LinkEnd> auto& end) {
   io.number(end.id);
-  io.number(end.utime);
-  transfer(io, end.T_odom_body);
+  transfer(io, end.filter);
   transfer(io, end.estimate);
 }
 

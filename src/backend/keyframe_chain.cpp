@@ -20,8 +20,8 @@ namespace {
 std::optional<std::string> imu_obstacle(const Keyframe& keyframe, const LinkEnd& previous, const ImuNoise& noise) {
   if (keyframe.id != previous.id + 1) return "keyframes are missing before this one";
   if (!keyframe.imu_complete) return "the front end reports an IMU gap";
-  if (keyframe.previous_utime != previous.utime) return "the interval does not begin at the previous keyframe";
-  return imu_problem(keyframe.imu, previous.utime, keyframe.state.utime, noise);
+  if (keyframe.previous_utime != previous.filter.utime) return "the interval does not begin at the previous keyframe";
+  return imu_problem(keyframe.imu, previous.filter.utime, keyframe.state.utime, noise);
 }
 
 /// Of the pose, attitude then position, both in body axes.
@@ -87,7 +87,7 @@ KeyframeVerdict verdict_on(const Keyframe& keyframe, const SmootherState& state,
   reason = keyframe_problem(keyframe);
   if (reason.empty() && !state.nodes.empty()) {
     const LinkEnd& newest = state.nodes.back().end;
-    reason = succession_problem(keyframe, newest.utime, newest.T_odom_body);
+    reason = succession_problem(keyframe, newest.filter.utime, newest.filter.T_odom_body);
   }
   return reason.empty() ? KeyframeVerdict::kAccepted : KeyframeVerdict::kInvalid;
 }
@@ -95,17 +95,16 @@ KeyframeVerdict verdict_on(const Keyframe& keyframe, const SmootherState& state,
 bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state) {
   if (state.nodes.empty() || keyframe.session != state.session) return false;
   if (const GraphNode* node = state.node_of(keyframe.id)) {
-    return node->end.utime != keyframe.state.utime ||
-           node->end.T_odom_body.translation != keyframe.state.T_odom_body.translation;
+    return node->end.filter.utime != keyframe.state.utime ||
+           node->end.filter.T_odom_body.translation != keyframe.state.T_odom_body.translation;
   }
   const LinkEnd& newest = state.nodes.back().end;
-  return keyframe.id == newest.id + 1 && keyframe.previous_utime != newest.utime;
+  return keyframe.id == newest.id + 1 && keyframe.previous_utime != newest.filter.utime;
 }
 
 SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
                               SmootherState& state, std::string& left_out) {
-  GraphNode node{
-      {keyframe.id, keyframe.state.utime, keyframe.state.T_odom_body, {}}, {}, pose_covariance(keyframe), {}};
+  GraphNode node{{keyframe.id, keyframe.state, {}}, {}, pose_covariance(keyframe), {}};
   SolverOutcome outcome = state.nodes.empty() ? insert_first(keyframe, config, solver, node)
                                               : insert_next(keyframe, config, solver, state, node, left_out);
   if (!outcome.accepted) return outcome;

@@ -15,6 +15,7 @@
 #include <numbers>
 
 #include "backend/gtsam_conversion.h"
+#include "backend/open_shifts.h"
 #include "backend/preintegration.h"
 #include "backend/relative_pose_factor.h"
 
@@ -72,6 +73,19 @@ void add_loose_factors(const KeyframeLink& link, const BackendConfig& config, gt
       bias_noise(config.imu.accel_bias_walk * root_time, config.imu.gyro_bias_walk * root_time));
 }
 
+/// A state of the filter in map; its other fields stay.
+NavState placed(NavState state, const Pose& T_map_odom) {
+  state.T_odom_body = T_map_odom * state.T_odom_body;
+  state.v_odom = T_map_odom.rotation * state.v_odom;
+  return state;
+}
+
+/// Shifts that the interval's scans leave open, in body axes of its start.
+Eigen::Matrix3d open_between(const Pose& T_previous_this, const Matrix6d& scan_information) {
+  const Eigen::Matrix3d R = T_previous_this.rotation.toRotationMatrix();
+  return R * open_shifts(scan_information.bottomRightCorner<3, 3>()) * R.transpose();
+}
+
 }  // namespace
 
 WhiteningRows loose_rows(const BackendConfig& config) {
@@ -97,16 +111,19 @@ KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool u
   link.id = keyframe.id;
   link.previous_id = previous.id;
   link.stationary = keyframe.stationary;
-  link.interval_s = seconds_between(previous.utime, keyframe.state.utime);
-  link.T_previous_this = previous.T_odom_body.inverse() * keyframe.state.T_odom_body;
+  link.interval_s = seconds_between(previous.filter.utime, keyframe.state.utime);
+  link.T_previous_this = previous.filter.T_odom_body.inverse() * keyframe.state.T_odom_body;
   link.odometry = odometry;
-  const Pose T_map_odom = previous.estimate.T_odom_body * previous.T_odom_body.inverse();
+  const Pose T_map_odom = previous.estimate.T_odom_body * previous.filter.T_odom_body.inverse();
   link.guess = previous.estimate;
   link.guess.T_odom_body = previous.estimate.T_odom_body * link.T_previous_this;
   link.guess.v_odom = T_map_odom.rotation * keyframe.state.v_odom;
   if (use_imu) {
-    link.imu =
-        plain_sum(preintegrate(keyframe.imu, previous.utime, keyframe.state.utime, previous.estimate, config.imu));
+    const ImuSum sum = plain_sum(
+        preintegrate(keyframe.imu, previous.filter.utime, keyframe.state.utime, previous.estimate, config.imu));
+    link.imu = agreeing_along(open_between(link.T_previous_this, keyframe.scan_information),
+                              placed(previous.filter, T_map_odom), placed(keyframe.state, T_map_odom),
+                              config.imu.gravity, sum);
   }
   return link;
 }

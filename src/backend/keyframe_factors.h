@@ -21,8 +21,7 @@ namespace ignis {
 /// The newest keyframe of the graph, to which the next one is linked.
 struct LinkEnd {
   std::int32_t id = 0;
-  Utime utime = 0;
-  Pose T_odom_body;   ///< as the front end saw it
+  NavState filter;    ///< as the front end saw it
   NavState estimate;  ///< as the graph places it; fields named odom are in map
 };
 
@@ -44,7 +43,8 @@ struct KeyframeLink {
 [[nodiscard]] KeyframeLink first_link(const Keyframe& keyframe, const BackendConfig& config);
 
 /// Links a keyframe to the previous one. `use_imu` requires that imu_problem() is silent. `odometry` constrains the
-/// relative pose by scan matching; it may have no rows.
+/// relative pose by scan matching; it may have no rows. Along what scans leave open the sum of the IMU's samples agrees
+/// with the filter's own motion (open_shifts.h).
 [[nodiscard]] KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool use_imu,
                                      const WhiteningRows& odometry, const BackendConfig& config);
 

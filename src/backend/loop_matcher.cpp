@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/plane_smoothness.h"
 #include "common/so3.h"
 
 namespace ignis {
@@ -46,13 +47,10 @@ struct NormalEquations {
   int walls_matched = 0;
 };
 
-/// What a plane and a residual count for. Where an edge passes for a plane the fit depends on how the place was seen,
-/// so that two visits see two planes (config.smooth_plane_m, as in the front end).
+/// What a plane and a residual count for.
 double weight_of(const SurfacePlane& plane, double residual, double radius_m, const LoopMatcherConfig& config) {
   const double kernel = kKernelPerRadius * radius_m;
-  const double limit2 = config.smooth_plane_m * config.smooth_plane_m;
-  const double smoothness = limit2 > 0.0 ? limit2 / (limit2 + plane.variance) : 1.0;
-  return smoothness / (1.0 + residual * residual / (kernel * kernel));
+  return plane_smoothness(plane.variance, config.smooth_plane_m) / (1.0 + residual * residual / (kernel * kernel));
 }
 
 /// Of every `stride`-th point.

@@ -73,7 +73,8 @@ bool too_soon(const SmootherState& state, const BackendConfig& config) {
   if (last == nullptr) return false;
   const LinkEnd& now = state.nodes.back().end;
   if (now.id - last->end.id < config.loop_min_spacing) return true;
-  return (now.T_odom_body.translation - last->end.T_odom_body.translation).norm() < config.loop_min_travel_m;
+  return (now.filter.T_odom_body.translation - last->end.filter.T_odom_body.translation).norm() <
+         config.loop_min_travel_m;
 }
 
 /// Where the chi-square test against the odometry decides, the match itself must not.

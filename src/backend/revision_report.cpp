@@ -47,7 +47,7 @@ void refresh_poses(IncrementalSolver& solver, SmootherState& state) {
 
 Pose T_map_odom(const SmootherState& state) {
   if (state.nodes.empty()) return {};
-  return state.poses.back().T_map_body * state.nodes.back().end.T_odom_body.inverse();
+  return state.poses.back().T_map_body * state.nodes.back().end.filter.T_odom_body.inverse();
 }
 
 void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUpdate& update) {
@@ -57,7 +57,7 @@ void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUp
   if (state.nodes.empty()) return;
   const LinkEnd& end = state.nodes.back().end;
   update.newest = estimate_of(solver, end.id);
-  update.newest.utime = end.utime;
+  update.newest.utime = end.filter.utime;
   update.newest.angular_rate = state.angular_rate;
   if (!update.accepted()) return;
   if (const auto covariance = solver.marginal_covariance(X(end.id))) {
@@ -72,7 +72,7 @@ PoseGraph exported_graph(const SmootherState& state) {
   graph.vertices = state.poses;
   for (std::size_t i = 1; i < state.nodes.size(); ++i) {
     const WhiteningRows& rows = state.nodes[i].odometry;
-    const Pose T_from_to = state.nodes[i - 1].end.T_odom_body.inverse() * state.nodes[i].end.T_odom_body;
+    const Pose T_from_to = state.nodes[i - 1].end.filter.T_odom_body.inverse() * state.nodes[i].end.filter.T_odom_body;
     graph.edges.push_back(
         {state.nodes[i - 1].end.id, state.nodes[i].end.id, T_from_to, rows.transpose() * rows, false});
   }

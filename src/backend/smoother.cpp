@@ -32,7 +32,7 @@ struct Smoother::Impl {
 
   void close_loop(SmootherUpdate& update) {
     LoopProposal proposal = search_loop(state, config, gates);
-    proposal.result.utime = state.nodes.back().end.utime;
+    proposal.result.utime = state.nodes.back().end.filter.utime;
     proposal.result.keyframes = static_cast<int>(state.nodes.size());
     update.loop = proposal.result;
     if (!proposal.verified()) return;
@@ -119,7 +119,7 @@ SmootherUpdate Smoother::add_loop(const LoopMeasurement& measurement) {
     result.reason = LoopReason::kVetoed;
     result.reason_text = text(result.reason);
   } else {
-    result.utime = from->end.utime;
+    result.utime = from->end.filter.utime;
     follow_nodes(state, config);
     impl_->judge_loop(result, whitening(measurement.information), update);
     impl_->review(update);

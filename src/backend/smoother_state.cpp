@@ -19,7 +19,7 @@ void follow_nodes(SmootherState& state, const BackendConfig& config) {
   const Matrix6d background = loose.transpose() * loose;
   for (std::size_t i = state.odometry.size(); i < state.nodes.size(); ++i) {
     const GraphNode& node = state.nodes[i];
-    state.odometry.append(node.end.T_odom_body, covariance_of(node.odometry, background), node.pose_covariance);
+    state.odometry.append(node.end.filter.T_odom_body, covariance_of(node.odometry, background), node.pose_covariance);
   }
   for (std::size_t i = 0; i < state.poses.size(); ++i) state.places.place(i, state.poses[i].T_map_body.translation);
 }
