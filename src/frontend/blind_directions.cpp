@@ -29,20 +29,24 @@ Matrix6d carry_of(const Pose& from, const Pose& to) {
 }  // namespace
 
 void BlindDirections::move_to(const Pose& T_odom_body) {
+  if (held_scans_ > 0) carry_directions(carry_of(T_odom_body_, T_odom_body));
   const Matrix6d back = carry_of(T_odom_body, T_odom_body_);
   for (Matrix6d* sum : {&sensitivity_, &noise_, &held_sensitivity_}) *sum = (back.transpose() * *sum * back).eval();
-  if (held_scans_ > 0) carry_directions(carry_of(T_odom_body_, T_odom_body));
   T_odom_body_ = T_odom_body;
 }
 
-/// A shift is the same everywhere, and what is mostly one counts as a pure one: the bit of turn that noise mixes in
-/// would tilt it by more the farther the vehicle goes.
+/// A shift is the same everywhere, and what counts as a pure one stays that: the bit of turn that noise mixes in would
+/// tilt it by more the farther the vehicle goes.
 void BlindDirections::carry_directions(const Matrix6d& carry) {
   Vector6d scale = Vector6d::Ones();
   scale.head<3>().setConstant(held_length_);
   const Matrix6d scaled = scale.asDiagonal() * carry * scale.cwiseInverse().asDiagonal();
   const auto is_blind = [&](Eigen::Index k) { return blind_[static_cast<std::size_t>(k)]; };
-  const auto is_shift = [&](Eigen::Index k) { return is_mostly_shift(held_basis_.col(k)); };
+  const std::array<bool, 6> turning =
+      turning_among(held_basis_, blind_, ScaledSensitivity(sensitivity_, noise_, held_length_));
+  const auto is_shift = [&](Eigen::Index k) {
+    return is_mostly_shift(held_basis_.col(k)) && !turning[static_cast<std::size_t>(k)];
+  };
   std::array<Eigen::Index, 6> order{0, 1, 2, 3, 4, 5};
   // The first ones stay what they are, the others make room.
   const auto observed = std::ranges::stable_partition(order, is_blind);
@@ -71,8 +75,9 @@ DegeneracyAnalysis BlindDirections::add_scan(const Matrix6d& sensitivity, const 
   if (held_scans_ < kMostHeldScans) average_direction(sensitivity);
   std::array<double, 6> needed;
   for (std::size_t i = 0; i < 6; ++i) needed[i] = limits.min_signal_to_noise * (blind_[i] ? kRelease : 1.0);
-  const DegeneracyAnalysis held = judge_directions(held_basis_, recent, needed, limits.min_sensitivity);
-  blind_ = held.blind;
+  blind_ = blind_among(held_basis_, recent, needed, limits.min_sensitivity);
+  const std::array<bool, 6> turning = turning_among(held_basis_, blind_, recent);
+  const DegeneracyAnalysis held = without_blind(held_basis_, recent, blind_, turning, limits.min_sensitivity);
   disagreeing_ = newest.degenerate_directions > held.degenerate_directions ? disagreeing_ + 1 : 0;
   if (newest.degenerate_directions == 0 && held.degenerate_directions == 0) held_scans_ = 0;
   return held;

@@ -18,8 +18,9 @@ namespace ignis {
 /// tilt between the two, the harder the better the other directions are observed. So a blind direction is averaged over
 /// two seconds and then stays what it is until it ends, and it takes more evidence to end it than to name it.
 ///
-/// What is blind is a motion of all that is seen: of a corridor along itself, of a round tank about its axis. To a
-/// vehicle that drives on, the second is the same turn with another shift, so scans and directions are carried along.
+/// What is blind is a motion of all that is seen: of a corridor along itself, of a round tank or a corridor that bends
+/// about its axis. To a vehicle that drives on, a turn about an axis is the same turn with another shift, so scans and
+/// directions are carried along.
 class BlindDirections {
  public:
   /// The next scan is matched at about this pose.

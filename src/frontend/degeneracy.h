@@ -30,7 +30,7 @@ struct DegeneracyAnalysis {
   int degenerate_directions = 0;            ///< 0..6
   Vector6d eigenvalues = Vector6d::Zero();  ///< mean squared sensitivity per point of each direction looked at
   Vector6d noise = Vector6d::Zero();        ///< the part of each that errors of the normals explain
-  std::array<bool, 6> blind{};              ///< which of them are degenerate
+  double length_m = 1.0;                    ///< that scales attitude below
   /// Degenerate unit directions in scaled coordinates: (length x attitude, position).
   std::vector<Vector6d> degenerate;
   /// What a scan may be relied on for: keeps a direction of the pose error by the square root of the share of its
@@ -58,16 +58,36 @@ struct DegeneracyAnalysis {
 /// The shift alone of a unit direction that is mostly one; any other as it is.
 [[nodiscard]] Vector6d without_small_turn(const Vector6d& direction);
 
-/// The same for given orthonormal directions, the columns of `basis`; `needed` is the signal to noise that each needs.
+/// Which of given orthonormal directions, the columns of `basis`, a scan does not observe; `needed` is the signal to
+/// noise that each needs.
+[[nodiscard]] std::array<bool, 6> blind_among(const Matrix6d& basis, const ScaledSensitivity& scan,
+                                              const std::array<double, 6>& needed, double min_sensitivity);
+
+/// Which of the `blind` ones that are mostly shifts turn all the same.
 ///
-/// A degenerate direction that is mostly a shift is taken for a pure shift, which is what it is: with the attitude
-/// fixed, parallel walls say nothing about the way along them. The bit of attitude that noise mixes in would tie the
-/// two together, turn the vehicle as it goes and, by gravity, accelerate it.
-[[nodiscard]] DegeneracyAnalysis judge_directions(const Matrix6d& basis, const ScaledSensitivity& scan,
-                                                  const std::array<double, 6>& needed, double min_sensitivity);
+/// A blind direction is a shift and a bit of turn. Along a straight corridor the turn is what noise mixes in: the shift
+/// alone is as blind. Along a bend of it the turn belongs to the motion, and the shift alone runs into the walls. So
+/// that it is a shift alone is believed until a scan contradicts: until the signal of the shift alone exceeds that of
+/// the blind motions nearest to it by more than a share of the noise. The noise of the normals is in both and cancels.
+[[nodiscard]] std::array<bool, 6> turning_among(const Matrix6d& basis, const std::array<bool, 6>& blind,
+                                                const ScaledSensitivity& scan);
+
+/// What a scan says when it does not observe those directions that are `blind`.
+///
+/// One of them that is mostly a shift and not `turning` is taken for a pure shift, which is what it is: with the
+/// attitude fixed, parallel walls say nothing about the way along them. The bit of attitude that noise mixes in would
+/// tie the two together, turn the vehicle as it goes and, by gravity, accelerate it.
+[[nodiscard]] DegeneracyAnalysis without_blind(const Matrix6d& basis, const ScaledSensitivity& scan,
+                                               const std::array<bool, 6>& blind, const std::array<bool, 6>& turning,
+                                               double min_sensitivity);
 
 /// The degenerate directions that are shifts, as unit vectors in odom axes.
 [[nodiscard]] std::vector<Eigen::Vector3d> blind_shifts(const DegeneracyAnalysis& analysis);
+
+/// Where a point [m, body axes] goes under each of these, as unit vectors in odom axes; `R` turns body into odom axes.
+/// Along a bend that is not where the vehicle goes.
+void blind_shifts_of_point(const DegeneracyAnalysis& analysis, const Eigen::Matrix3d& R,
+                           const Eigen::Vector3d& point_body, std::vector<Eigen::Vector3d>& axes);
 
 /// The same analysis without those shifts along which `information` (of the position, odom axes, [1/m^2]) is better
 /// than `sigma_m`: for what is reported.
@@ -80,8 +100,8 @@ struct DegeneracyAnalysis {
 [[nodiscard]] Eigen::Matrix3d tilt_of_blind_shifts(const DegeneracyAnalysis& analysis,
                                                    const Eigen::Matrix3d& position_covariance);
 
-/// The degenerate directions for people: each by its larger part, position in odom axes or attitude in body axes. Empty
-/// when there are none.
+/// The degenerate directions for people: each by its larger part, position in odom axes or attitude in body axes; a
+/// shift along a bend with the turn that goes with it. Empty when there are none.
 [[nodiscard]] std::string describe(const DegeneracyAnalysis& analysis);
 
 }  // namespace ignis

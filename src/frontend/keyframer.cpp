@@ -12,6 +12,7 @@
 namespace ignis {
 namespace {
 
+constexpr double kLongestImu = 120.0;             // s: nobody integrates a longer interval (backend.imu.max_interval_s)
 constexpr double kStationaryDisplacement = 0.03;  // m: above the jitter of a standing filter
 constexpr double kStationaryTurnRate = 0.02;      // rad/s, mean over the interval
 
@@ -30,6 +31,11 @@ Keyframer::Keyframer(const FrontendConfig& config, std::int32_t session)
 
 void Keyframer::add_imu(const ImuSample& sample) {
   if (next_id_ == 0) return;
+  // A pose that nobody confirms for an hour must not fill the memory, nor the next keyframe.
+  if (!imu_.empty() && seconds_between(imu_.front().utime, sample.utime) > kLongestImu) {
+    imu_.clear();
+    imu_complete_ = false;
+  }
   imu_.push_back(sample);
   information_.add_imu(sample);
 }

@@ -13,7 +13,8 @@
 /// A dozen points on an end wall pin a corridor's axis to a centimetre, yet among a thousand wall points whose normals
 /// are off by a degree at random their share of the sum drowns. So once the sum has named a direction as blind (see
 /// degeneracy.h), each plane is asked for itself: is its normal's component along the axis more than its own error can
-/// make it? After the per-point contributions of T. Tuna, J. Nubert, Y. Nava, S. Khattak, M. Hutter, "X-ICP:
+/// make it? Where a corridor bends the axis is the way its own wall goes, not the vehicle's (blind_shifts_of_point).
+/// After the per-point contributions of T. Tuna, J. Nubert, Y. Nava, S. Khattak, M. Hutter, "X-ICP:
 /// Localizability-Aware LiDAR Registration for Robust Localization in Extreme Environments", IEEE T-RO 40, 2024; there
 /// the bound is a fixed angle, here it is a multiple of the normal's sigma.
 namespace ignis {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "common/plane_smoothness.h"
 #include "common/so3.h"
 #include "frontend/square_sum.h"
 
@@ -113,7 +114,8 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       const PlaneFit& plane = planes_[i];
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
-      constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), smoothness(plane), 1.0});
+      const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
+      constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), smoothness, 1.0});
     }
   }
   leave_out_new_surfaces(map.scans());
@@ -226,13 +228,6 @@ void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
   }
 }
 
-/// Where an edge or a corner passes for a plane, the fit depends on where the query lies and from where its
-/// surroundings were seen. That is the same in scan after scan, so it does not average out.
-double ScanMatcher::smoothness(const PlaneFit& plane) const {
-  const double limit2 = config_.smooth_plane_m * config_.smooth_plane_m;
-  return limit2 > 0.0 ? limit2 / (limit2 + plane.scatter[0]) : 1.0;
-}
-
 double ScanMatcher::residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t, const Constraint& constraint) {
   return constraint.plane.normal.dot(R * constraint.point_body + t) - constraint.plane_distance;
 }
@@ -332,10 +327,12 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
 SalientPart ScanMatcher::find_salient(const FilterState& at) {
   int found = 0;
   double scan_sum = 0.0;
-  const std::vector<Eigen::Vector3d> axes = blind_shifts(degeneracy_);
+  const Eigen::Matrix3d R = at.nominal.T_odom_body.rotation.toRotationMatrix();
+  std::vector<Eigen::Vector3d> axes;
   const auto counts = [&](const Constraint& constraint) {
-    const bool salient = constraint.plane.mean_scan >= salient_since_ &&
-                         is_salient(constraint.plane, axes, pooled_variance_, config_.salient_sigma);
+    if (constraint.plane.mean_scan < salient_since_) return false;
+    blind_shifts_of_point(degeneracy_, R, constraint.point_body, axes);
+    const bool salient = is_salient(constraint.plane, axes, pooled_variance_, config_.salient_sigma);
     if (salient) {
       ++found;
       scan_sum += constraint.plane.mean_scan;

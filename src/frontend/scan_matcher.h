@@ -81,8 +81,6 @@ class ScanMatcher {
   void fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config, double radius);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
-  /// How much a plane counts by its roughness, (0, 1].
-  [[nodiscard]] double smoothness(const PlaneFit& plane) const;
   void weigh(const Eigen::Vector3d& observability);
   /// Distance of a point from its plane [m] at the pose (R, t).
   [[nodiscard]] static double residual(const Eigen::Matrix3d& R, const Eigen::Vector3d& t,

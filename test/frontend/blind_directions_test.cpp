@@ -112,6 +112,35 @@ TEST(BlindDirections, AreCarriedAlongByAVehicleThatDrivesRoundInATank) {
   }
 }
 
+/// What a corridor that bends to the left looks like from a pose that stands along it, in odom axes.
+Planes bend_planes_at(const Pose& T_odom_body, double radius, std::uint32_t seed) {
+  Planes planes = test::bend_planes(radius, kNormalSigma, seed);
+  Matrix6d to_odom = Matrix6d::Identity();
+  to_odom.bottomRightCorner<3, 3>() = T_odom_body.rotation.toRotationMatrix();
+  planes.sensitivity = (to_odom * planes.sensitivity * to_odom.transpose()).eval();
+  planes.noise = (to_odom * planes.noise * to_odom.transpose()).eval();
+  return planes;
+}
+
+TEST(BlindDirections, AlongABendAreAShiftAndTheTurnThatGoesWithIt) {
+  for (const double radius : {6.0, 12.0, 25.0}) {
+    BlindDirections blind;
+    for (int k = 0; k < 400; ++k) {
+      const Eigen::AngleAxisd round(0.04 / radius * k, Eigen::Vector3d::UnitY());
+      const Eigen::Vector3d axis(-radius, 0.0, 0.0);
+      const Pose T_odom_body{Eigen::Quaterniond(round), axis - round * axis};
+      const Planes planes = bend_planes_at(T_odom_body, radius, static_cast<std::uint32_t>(k));
+      blind.move_to(T_odom_body);
+      const DegeneracyAnalysis analysis = blind.add_scan(planes.sensitivity, planes.noise, true, kLimits);
+      if (k < 40) continue;
+      ASSERT_EQ(analysis.degenerate_directions, 1) << radius << " m, " << k;
+      Vector6d along;
+      along << kLimits.length_m * Eigen::Vector3d::UnitY(), radius * (round * -Eigen::Vector3d::UnitZ());
+      ASSERT_GT(std::abs(analysis.degenerate[0].dot(along.normalized())), 0.999) << radius << " m, " << k;
+    }
+  }
+}
+
 TEST(BlindDirections, TakeTheNewestScanAloneWhileTheMapIsYoung) {
   BlindDirections blind;
   for (std::uint32_t k = 0; k < 10; ++k) {

@@ -13,7 +13,8 @@ class Stepper {
  public:
   explicit Stepper(const FrontendConfig& config = {}) : keyframer(config, 3) {}
 
-  std::optional<Keyframe> step(const Eigen::Vector3d& position, double yaw = 0.0, double speed = 0.0) {
+  std::optional<Keyframe> step(const Eigen::Vector3d& position, double yaw = 0.0, double speed = 0.0,
+                               bool confirmed = true) {
     for (int i = 0; i < 5; ++i) {
       ImuSample sample;
       sample.utime = now + 10'000 * i;
@@ -25,7 +26,7 @@ class Stepper {
     filter.nominal.utime = now;
     filter.nominal.T_odom_body = {frames::from_yaw_pitch_roll({yaw, 0.0, 0.0}), position};
     filter.nominal.v_odom = {0.0, 0.0, -speed};
-    return keyframer.add_scan(filter, Matrix6d::Identity(), cloud);
+    return keyframer.add_scan(filter, Matrix6d::Identity(), cloud, confirmed);
   }
 
   Keyframer keyframer;
@@ -101,6 +102,19 @@ TEST(Keyframer, AGapMarksItsIntervalOnly) {
   stepper.keyframer.note_gap();
   EXPECT_FALSE(stepper.step({0, 0, -5})->imu_complete);
   EXPECT_TRUE(stepper.step({0, 0, -10})->imu_complete);
+}
+
+TEST(Keyframer, ForgetsSamplesOfAnIntervalThatIsTooLongToIntegrate) {
+  Stepper stepper;
+  stepper.step({0, 0, 0});
+  for (int i = 0; i < 20 * 300; ++i) EXPECT_FALSE(stepper.step({0, 0, 0}, 0.0, 0.0, false).has_value());
+  const auto keyframe = stepper.step({0, 0, 0});
+  ASSERT_TRUE(keyframe.has_value());
+  EXPECT_FALSE(keyframe->imu_complete);
+  EXPECT_LE(keyframe->imu.size(), 120U * 100U + 1U);
+  const auto next = stepper.step({0, 0, -10.0});
+  ASSERT_TRUE(next.has_value());
+  EXPECT_TRUE(next->imu_complete);
 }
 
 TEST(Keyframer, InformationIsThatOfItsIntervalAlone) {

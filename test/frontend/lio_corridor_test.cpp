@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A corridor whose ends are in sight: a dozen points of a scan hold its axis, among a thousand that do not.
+// A corridor whose ends are in sight: a dozen points of a scan hold its axis, among a thousand that do not. And one
+// that bends, where nothing does.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -97,6 +98,31 @@ TEST(LioCorridor, TheEndIsOverlookedWithoutSalientPoints) {
   config.salient_sigma = 0.0;
   const Along along = along_corridor(config, drive_in(closed_corridor(), 1));
   EXPECT_GT(along.share_named, 0.3) << "else the tests above would hold without them";
+}
+
+test::PoseNees nees_in_bend(double radius_m, std::uint32_t seed) {
+  test::Sensors sensors;
+  sensors.range_sigma = 0.02;
+  const Drive drive = test::simulate(test::bent_corridor(radius_m), test::ellipse_drive(2.5, radius_m, radius_m, 1.0),
+                                     20.0, sensors, seed);
+  return test::pose_nees(test::run_lio(test::tuned_config(), drive), drive);
+}
+
+TEST(LioCorridor, AlongABendTheHeadingIsAsOpenAsTheWay) {
+  for (const double radius_m : {6.0, 12.0}) {
+    std::vector<double> position;
+    std::vector<double> attitude;
+    for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+      const test::PoseNees nees = nees_in_bend(radius_m, seed);
+      position.push_back(nees.position);
+      attitude.push_back(nees.attitude);
+    }
+    // The median: as above.
+    std::ranges::sort(position);
+    std::ranges::sort(attitude);
+    EXPECT_LT(position[1], 3.0) << radius_m << " m";
+    EXPECT_LT(attitude[1], 3.0) << radius_m << " m";
+  }
 }
 
 }  // namespace

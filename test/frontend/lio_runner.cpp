@@ -9,6 +9,7 @@
 
 #include "common/config_json.h"
 #include "common/loop_gates.h"
+#include "common/so3.h"
 
 namespace ignis::test {
 
@@ -62,6 +63,24 @@ double aligned_error(const LioRun& run, const Drive& drive) {
 double end_error(const LioRun& run, const Drive& drive) {
   const NavState& last = run.scans.back().state;
   return (last.T_odom_body.translation - drive.truth(drive_seconds(drive, last.utime)).translation).norm();
+}
+
+PoseNees pose_nees(const LioRun& run, const Drive& drive) {
+  const auto per_dimension = [](const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+    return error.dot(covariance.inverse() * error) / 3.0;
+  };
+  PoseNees sum;
+  int scans = 0;
+  for (const ScanResult& scan : run.scans) {
+    if (!scan.stats.applied()) continue;
+    const Pose truth = drive.truth(drive_seconds(drive, scan.state.utime));
+    const Eigen::Vector3d shift = truth.translation - scan.state.T_odom_body.translation;
+    const Eigen::Vector3d turn = so3::log(scan.state.T_odom_body.rotation.conjugate() * truth.rotation);
+    sum.position += per_dimension(shift, scan.covariance.block<3, 3>(kPosition, kPosition));
+    sum.attitude += per_dimension(turn, scan.covariance.block<3, 3>(kAttitude, kAttitude));
+    ++scans;
+  }
+  return {sum.position / scans, sum.attitude / scans};
 }
 
 int count(const LioRun& run, ScanReason reason) {

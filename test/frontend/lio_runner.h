@@ -27,6 +27,15 @@ struct LioRun {
 /// [m] Position error at the last scan, in the frame of the start.
 [[nodiscard]] double end_error(const LioRun& run, const Drive& drive);
 
+/// Squared errors of the pose over what the published covariance says, per degree of freedom.
+struct PoseNees {
+  double position = 0.0;
+  double attitude = 0.0;
+};
+
+/// Mean over the scans that were applied.
+[[nodiscard]] PoseNees pose_nees(const LioRun& run, const Drive& drive);
+
 [[nodiscard]] int count(const LioRun& run, ScanReason reason);
 
 /// The front end of config/ignis8_tuned.json.

@@ -58,6 +58,30 @@ inline Planes corridor_planes(double sigma, int faces, std::uint32_t seed) {
   return planes;
 }
 
+/// Walls, floor and ceiling of a corridor that bends about an upright axis `radius` [m] to the left, as a vehicle in
+/// its middle sees them that looks along -Z: as far as the inner wall lets it.
+inline Planes bend_planes(double radius, double sigma, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  const double inner = std::acos((radius - 1.4) / radius);
+  const double outer = inner + std::acos((radius - 1.4) / (radius + 1.4));
+  std::uniform_real_distribution<double> ahead(-1.0, 1.0);
+  std::uniform_real_distribution<double> across(-1.4, 1.4);
+  constexpr int kPoints = 800;
+  const Eigen::Vector3d axis(-radius, 0.0, 0.0);
+  Planes planes;
+  for (int i = 0; i < kPoints; ++i) {
+    const bool wall = i % 2 == 0;
+    const double side = i % 4 < 2 ? -1.4 : 1.4;
+    const double angle = ahead(random) * (wall && side > 0.0 ? outer : inner);
+    const Eigen::Vector3d outward(std::cos(angle), 0.0, std::sin(angle));
+    const double from_axis = radius + (wall ? side : across(random));
+    const double up = wall ? across(random) : side;
+    const Eigen::Vector3d point = axis + from_axis * outward + up * Eigen::Vector3d::UnitY();
+    add_point(planes, point, wall ? outward : Eigen::Vector3d::UnitY(), sigma, kPoints, random);
+  }
+  return planes;
+}
+
 /// The wall, floor and ceiling of a round tank of 6 m radius about the odom Y axis, as a vehicle at a pose sees them.
 inline Planes tank_planes(const Pose& T_odom_body, double sigma, std::uint32_t seed) {
   std::mt19937 random(seed);

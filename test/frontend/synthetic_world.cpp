@@ -31,7 +31,9 @@ std::pair<double, double> slab(const Box& box, const Eigen::Vector3d& origin, co
   return {entry, exit};
 }
 
-double pillar_distance(const Pillar& pillar, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+/// Where a ray meets an upright cylinder: on its way in, or on its way out. Negative when it does not.
+double pillar_distance(const Pillar& pillar, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                       bool from_inside) {
   const double dx = origin.x() - pillar.x;
   const double dz = origin.z() - pillar.z;
   const double a = direction.x() * direction.x() + direction.z() * direction.z();
@@ -39,7 +41,8 @@ double pillar_distance(const Pillar& pillar, const Eigen::Vector3d& origin, cons
   const double c = dx * dx + dz * dz - pillar.radius * pillar.radius;
   const double discriminant = b * b - a * c;
   if (discriminant < 0.0 || a < 1e-12) return -1.0;
-  return (-b - std::sqrt(discriminant)) / a;
+  const double half = std::sqrt(discriminant);
+  return (-b + (from_inside ? half : -half)) / a;
 }
 
 /// Distance driven at time t after the start: the speed rises smoothly over two seconds.
@@ -159,10 +162,12 @@ double World::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& directi
   };
   for (const Box& box : boxes) meet(box);
   for (const Mover& mover : movers) meet(mover.at(seconds));
-  for (const Pillar& pillar : pillars) {
-    const double distance = pillar_distance(pillar, origin, direction);
+  const auto meet_round = [&](const Pillar& pillar, bool from_inside) {
+    const double distance = pillar_distance(pillar, origin, direction, from_inside);
     if (distance > 0.0) best = std::min(best, distance);
-  }
+  };
+  for (const Pillar& pillar : pillars) meet_round(pillar, false);
+  for (const Pillar& drum : drums) meet_round(drum, true);
   return best;
 }
 
@@ -210,6 +215,15 @@ World furnished_hall() {
 }
 
 World bare_corridor() { return {{{-1.5, -0.6, -500.0}, {1.5, 2.2, 500.0}}, {}, {}}; }
+
+World bent_corridor(double radius_m) {
+  World world = bare_corridor();
+  world.room.lo.x() = -500.0;
+  world.room.hi.x() = 500.0;
+  world.pillars = {{-radius_m, 0.0, radius_m - 1.5}};
+  world.drums = {{-radius_m, 0.0, radius_m + 1.5}};
+  return world;
+}
 
 World street() {
   World world;

@@ -37,6 +37,7 @@ struct World {
   std::vector<Box> boxes;
   std::vector<Pillar> pillars;
   std::vector<Mover> movers = {};
+  std::vector<Pillar> drums = {};  ///< seen from inside
 
   /// Distance to the first surface along a unit direction at an instant [s], or a negative number.
   [[nodiscard]] double cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double seconds) const;
@@ -78,6 +79,8 @@ struct Drive {
 [[nodiscard]] World furnished_hall();
 /// A bare corridor along Z, 3 m wide, without ends in sight.
 [[nodiscard]] World bare_corridor();
+/// The same bent about an upright axis `radius_m` to the left of its middle.
+[[nodiscard]] World bent_corridor(double radius_m);
 /// A street with facades, parked cars and poles, 200 m long.
 [[nodiscard]] World street();
 
