@@ -15,6 +15,12 @@ os.environ.setdefault("IGNIS_CHECKOUT", str(CHECKOUT))
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that enter a private network come last: there is no way back to the packages that others install."""
+    entering = {item.path for item in items if "private_network" in getattr(item, "fixturenames", ())}
+    items.sort(key=lambda item: item.path in entering)
+
+
 @pytest.fixture(scope="session")
 def private_network() -> None:
     """From here on this process and its children live in a network namespace of their own."""

@@ -30,7 +30,9 @@ def environment_python(name: str, requirements: Path, cache: Path) -> Path:
         command = [str(python), "-m", "pip", "install", "--quiet", *what]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            raise InputError(f"{requirements.name} could not be installed (is the network up?): {last}")
+            # The first line has the cause ("Network is unreachable"), the last only what follows from it.
+            lines = done.stderr.strip().splitlines() or ["no message"]
+            said = " ... ".join(dict.fromkeys((lines[0], lines[-1])))
+            raise InputError(f"{requirements.name} could not be installed (is the network up?): {said}")
     (folder / "ready").touch()
     return python
