@@ -70,10 +70,13 @@ def test_changed_scene_keeps_its_geometry_within_reach(tmp_path: Path) -> None:
     scenes, work = tmp_path / "scenes", tmp_path / "work" / "deep"
     scenes.mkdir()
     (scenes / "hall.json").write_text("{}")
-    (scenes / "quick.json").write_text('{"geometry": "hall.json", "imu": {"gyro_bias_walk": 1}}')
+    (scenes / "quick.json").write_text(
+        '{"geometry": "hall.json", "meshes": [{"file": "meshes/rock.ply"}], "imu": {"gyro_bias_walk": 1}}'
+    )
     changed = changed_scene(scenes / "quick.json", ["imu.gyro_bias_walk=2", "lidar.range_noise_m=0.02"], work)
     content = json.loads(changed.read_text())
     assert (changed.parent / content["geometry"]).resolve() == (scenes / "hall.json").resolve()
+    assert (changed.parent / content["meshes"][0]["file"]).resolve() == (scenes / "meshes/rock.ply").resolve()
     assert content["imu"]["gyro_bias_walk"] == 2
     assert content["lidar"] == {"range_noise_m": 0.02}
     with pytest.raises(InputError, match=r"section\.key=value"):

@@ -126,6 +126,15 @@ def test_occupied_port_is_named(run_binary, private_network) -> None:
         assert str(port) in refusal(done, done.returncode)
 
 
+@pytest.mark.parametrize("command", ["build", "test", "fuzz", "format", "lint"])
+def test_entry_script_explains_a_command_without_starting_it(command: str) -> None:
+    script = Path(os.environ["IGNIS_CHECKOUT"]) / "ignis"
+    done = subprocess.run([script, command, "--help"], capture_output=True, text=True, timeout=5)
+    assert done.returncode == 0 and not done.stderr
+    (line,) = done.stdout.splitlines()
+    assert command in line.split()
+
+
 @pytest.mark.parametrize("arguments", [["nonsense"], ["import", "no-such-bag", "-o", "x.lcmlog"], ["compare", "none"]])
 def test_entry_script_refuses_bad_arguments(arguments: list[str], tmp_path: Path) -> None:
     script = Path(os.environ["IGNIS_CHECKOUT"]) / "ignis"

@@ -14,7 +14,7 @@ PAGES = sorted([*CHECKOUT.glob("*.md"), *(CHECKOUT / "docs").glob("*.md")])
 _LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 _HEADING = re.compile(r"^#+\s+(.*)$", re.MULTILINE)
 # What only its own program may explain, or what does something when asked for help.
-_WITHOUT_HELP = {"help", "test", "build", "shell", "format", "lint", "fuzz"}
+_WITHOUT_HELP = {"help", "shell"}
 
 
 def anchor(heading: str) -> str:

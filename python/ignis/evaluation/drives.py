@@ -51,6 +51,8 @@ def changed_scene(scene: Path, changes: list[str], folder: Path) -> Path:
     content = json.loads(scene.read_text())
     if content.get("geometry"):
         content["geometry"] = os.path.relpath(scene.parent / content["geometry"], folder)
+    for mesh in content.get("meshes", []):
+        mesh["file"] = os.path.relpath(scene.parent / mesh["file"], folder)
     for change in changes:
         path, equals, value = change.partition("=")
         *sections, key = path.split(".")
