@@ -95,14 +95,6 @@ void transfer(auto& io, FieldsOf<GraphChange> auto& change) {
 
 namespace {
 
-template <class Value>
-std::vector<std::byte> encoded(const Value& value) {
-  std::vector<std::byte> bytes;
-  ByteWriter writer(bytes);
-  transfer(writer, value);
-  return bytes;
-}
-
 void copy_scalars(const SmootherState& from, SmootherState& to) {
   to.stats = from.stats;
   to.angular_rate = from.angular_rate;
@@ -160,15 +152,9 @@ std::string reference_problem(const SmootherState& state, std::size_t known, con
 
 }  // namespace
 
-std::vector<std::byte> encode_change(const GraphChange& change) { return encoded(change); }
+std::vector<std::byte> encode_change(const GraphChange& change) { return to_bytes(change); }
 
-std::optional<GraphChange> decode_change(std::span<const std::byte> bytes) {
-  std::optional<GraphChange> change(std::in_place);
-  ByteReader reader(bytes);
-  transfer(reader, *change);
-  if (reader.failed() || !reader.at_end()) change.reset();
-  return change;
-}
+std::optional<GraphChange> decode_change(std::span<const std::byte> bytes) { return from_bytes<GraphChange>(bytes); }
 
 std::string RestoredGraph::apply(GraphChange change) {
   if (std::string problem = chain_problem(state, change); !problem.empty()) return problem;

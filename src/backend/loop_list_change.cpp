@@ -33,11 +33,7 @@ LoopListChange LoopListMemory::next(const std::vector<GraphLoop>& loops) {
   LoopListChange change;
   std::vector<Known> now;
   now.reserve(loops.size());
-  for (const GraphLoop& loop : loops) {
-    now.push_back({loop.number, {}});
-    ByteWriter writer(now.back().bytes);
-    transfer(writer, loop);
-  }
+  for (const GraphLoop& loop : loops) now.push_back({loop.number, to_bytes(loop)});
   // Lists lose loops anywhere and gain them at the end. What has changed its place is taken out and put back in.
   std::size_t place = 0;
   for (const Known& before : known_) {

@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 /// Values to bytes and back, by one list of fields for both directions: a function `transfer(io, value)` per struct,
@@ -132,5 +133,25 @@ class ByteReader {
   std::span<const std::byte> bytes_;
   bool failed_ = false;
 };
+
+/// All of a value whose `transfer` stands in its own namespace.
+template <class Value>
+[[nodiscard]] std::vector<std::byte> to_bytes(const Value& value, std::size_t expected = 0) {
+  std::vector<std::byte> bytes;
+  bytes.reserve(expected);
+  ByteWriter writer(bytes);
+  transfer(writer, value);
+  return bytes;
+}
+
+/// The value that these bytes are, with none missing and none left over. Any bytes at all.
+template <class Value>
+[[nodiscard]] std::optional<Value> from_bytes(std::span<const std::byte> bytes) {
+  std::optional<Value> value(std::in_place);
+  ByteReader reader(bytes);
+  transfer(reader, *value);
+  if (reader.failed() || !reader.at_end()) value.reset();
+  return value;
+}
 
 }  // namespace ignis

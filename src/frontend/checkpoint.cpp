@@ -32,11 +32,7 @@ void transfer(auto& io, FieldsOf<Head> auto& head) {
 }
 
 std::vector<std::byte> record_of(const auto& value, std::size_t expected_bytes = 0) {
-  std::vector<std::byte> payload;
-  payload.reserve(expected_bytes);
-  ByteWriter writer(payload);
-  transfer(writer, value);
-  return encode_record(payload);
+  return encode_record(to_bytes(value, expected_bytes));
 }
 
 /// Why the bytes are no `value`; empty when they are.

@@ -15,6 +15,8 @@
 namespace ignis {
 namespace {
 
+constexpr std::size_t kRoomShare = 16;  // one part in so many of the bound becomes free at a time
+
 CellIndex cell_of(const Eigen::Vector3d& p, double per_metre) {
   return {floor_to_int(p.x() * per_metre), floor_to_int(p.y() * per_metre), floor_to_int(p.z() * per_metre)};
 }
@@ -154,7 +156,7 @@ std::vector<std::int32_t> KeyframeClouds::beyond_bound() const {
   std::ranges::sort(by_distance, std::greater{});
   std::size_t left = points();
   for (const auto& [distance, id] : by_distance) {
-    if (left <= max_points_) break;
+    if (left <= max_points_ - max_points_ / kRoomShare) break;
     left -= entries_.at(id).cloud->points.size();
     ids.push_back(id);
   }

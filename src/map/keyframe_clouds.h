@@ -24,8 +24,9 @@ namespace ignis {
 /// it keeps the point that came first; later points say nothing new, so what is kept is known at once and never
 /// changes. What is seen before the first keyframe belongs to a stand-in with the id kBeforeFirst.
 ///
-/// Bounded: beyond `max_points` the cloud that is farthest (horizontally, in odom) from the newest keyframe is dropped,
-/// and when the open one alone is that large, it takes no more. Memory: 16 bytes per point, 20 per block of 2 m, and
+/// Bounded: beyond `max_points` the clouds that are farthest (horizontally, in odom) from the newest keyframe are to be
+/// dropped, a sixteenth of the bound at a time, since what they leave has to be filled from the others. When the open
+/// one alone is that large, it takes no more. Memory: 16 bytes per point, 20 per block of 2 m, and
 /// for the open keyframe 19 to 39 per block of 4x4x4 cells beside. With rays followed, 4 bytes per free cell.
 class KeyframeClouds {
  public:
@@ -50,7 +51,7 @@ class KeyframeClouds {
   /// Adds a live scan to the newest keyframe.
   Kept add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body);
 
-  /// The farthest clouds, as many as the bound asks to go.
+  /// The farthest clouds, when there are more points than the bound allows: as many as make room for a while.
   [[nodiscard]] std::vector<std::int32_t> beyond_bound() const;
   void drop(std::span<const std::int32_t> ids);
 

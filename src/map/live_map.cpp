@@ -93,13 +93,18 @@ void LiveMap::cast_votes() {
   }
 }
 
-/// Not while a map is being built from them.
+/// Not while a map is being built from them. Where many clouds overlap, what is left is read again for each tile that
+/// one of them leaves: that is for a rebuild.
 void LiveMap::drop_far_clouds() {
   if (rebuilding_) return;
-  const std::vector<std::int32_t> ids = clouds_.beyond_bound();
-  if (ids.empty()) return;
-  map_.remove_clouds(ids, lookup());
-  clouds_.drop(ids);
+  leaving_ = clouds_.beyond_bound();
+  if (leaving_.empty() || is_for_a_rebuild(leaving_)) return;
+  map_.remove_clouds(leaving_, lookup());
+  clouds_.drop(std::exchange(leaving_, {}));
+}
+
+bool LiveMap::is_for_a_rebuild(std::span<const std::int32_t> changed) const {
+  return map_.cost_of_moving(changed, lookup()) > static_cast<std::size_t>(config_.reanchor_points);
 }
 
 void LiveMap::correct(const Pose& T_map_odom, std::span<const CorrectedPose> poses, std::int32_t revision) {
@@ -132,9 +137,8 @@ void LiveMap::settle() {
     moved.emplace_back(id, newest);
     ids.push_back(id);
   }
-  needs_rebuild_ =
-      !ids.empty() && map_.cost_of_moving(ids, lookup()) > static_cast<std::size_t>(config_.reanchor_points);
-  if (needs_rebuild_) return;
+  moved_far_ = !ids.empty() && is_for_a_rebuild(ids);
+  if (moved_far_) return;
   if (!moved.empty()) map_.move_clouds(moved, lookup());
   reanchored_ += static_cast<std::int64_t>(moved.size());
   drawn_revision_ = newest_revision_;
@@ -153,10 +157,11 @@ RebuildJob LiveMap::as_drawn() const {
 RebuildJob LiveMap::begin_rebuild() {
   RebuildJob job = as_drawn();
   job.coarsening = 0;
+  std::erase_if(job.clouds, [&](const PlacedCloud& cloud) { return std::ranges::contains(leaving_, cloud.id); });
   for (PlacedCloud& cloud : job.clouds) cloud.T_map_keyframe = newest_pose(cloud.id);
   rebuilt_revision_ = newest_revision_;
   rebuilding_ = true;
-  needs_rebuild_ = false;
+  moved_far_ = false;
   arrivals_.clear();
   return job;
 }
@@ -164,6 +169,7 @@ RebuildJob LiveMap::begin_rebuild() {
 void LiveMap::finish_rebuild(ThreeLevelMap map) {
   map.continue_versions(map_);
   map_ = std::move(map);
+  clouds_.drop(std::exchange(leaving_, {}));
   rebuilding_ = false;
   drawing_ = true;
   for (const Arrival& arrival : std::exchange(arrivals_, {})) {
@@ -190,7 +196,8 @@ void LiveMap::clear() {
   loops_.clear();
   T_map_odom_ = T_odom_body_ = Pose{};
   newest_revision_ = drawn_revision_ = 0;
-  needs_rebuild_ = rebuilding_ = false;
+  moved_far_ = rebuilding_ = false;
+  leaving_.clear();
   arrivals_.clear();
 }
 

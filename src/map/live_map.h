@@ -80,8 +80,8 @@ class LiveMap {
   /// Forgets everything: the front end started a new session, in a new odom frame.
   void clear();
 
-  /// True when keyframes have moved by more than is worth doing at once.
-  [[nodiscard]] bool needs_rebuild() const { return needs_rebuild_ && !rebuilding_; }
+  /// True when more has moved, or has to go, than is worth doing at once.
+  [[nodiscard]] bool needs_rebuild() const { return (moved_far_ || !leaving_.empty()) && !rebuilding_; }
 
   [[nodiscard]] RebuildJob begin_rebuild();
   void finish_rebuild(ThreeLevelMap map);
@@ -130,6 +130,7 @@ class LiveMap {
   InsertCounts show(const KeyframeClouds::Kept& kept);
   void cast_votes();
   void drop_far_clouds();
+  [[nodiscard]] bool is_for_a_rebuild(std::span<const std::int32_t> changed) const;
   void settle();
 
   MapConfig config_;
@@ -144,7 +145,8 @@ class LiveMap {
   std::int32_t drawn_revision_ = 0;
   std::int32_t rebuilt_revision_ = 0;  // that the rebuild under way will show
   bool drawing_ = true;
-  bool needs_rebuild_ = false;
+  bool moved_far_ = false;              // keyframes, so that only a rebuild brings the map to them
+  std::vector<std::int32_t> leaving_;   // clouds beyond the bound, for the next rebuild to leave out
   bool rebuilding_ = false;
   std::span<const std::uint32_t> newest_kept_;
   std::vector<Arrival> arrivals_;  // since the rebuild under way began

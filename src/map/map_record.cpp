@@ -9,7 +9,8 @@
 #include "common/measurement_bytes.h"
 
 namespace ignis {
-namespace {
+
+// They stand in the structs' own namespace, where the codec's templates look for them.
 
 void transfer(auto& io, FieldsOf<MapRecordHead> auto& head) {
   io.number(head.version);
@@ -22,26 +23,11 @@ void transfer(auto& io, FieldsOf<MapRecord> auto& record) {
   io.number(record.is_keyframe);
   io.number(record.is_late);
   io.number(record.utime);
-  ignis::transfer(io, record.T_odom_body);
+  transfer(io, record.T_odom_body);
   io.list(record.points);
 }
 
-template <class Value>
-std::vector<std::byte> encoded(const Value& value) {
-  std::vector<std::byte> bytes;
-  ByteWriter writer(bytes);
-  transfer(writer, value);
-  return bytes;
-}
-
-template <class Value>
-std::optional<Value> decoded(std::span<const std::byte> payload) {
-  Value value;
-  ByteReader reader(payload);
-  transfer(reader, value);
-  if (reader.failed() || !reader.at_end()) return std::nullopt;
-  return value;
-}
+namespace {
 
 std::vector<CloudPoint> kept_points(const LiveMap& map, std::span<const CloudPoint> points) {
   if (map.follows_rays()) return {points.begin(), points.end()};
@@ -53,13 +39,13 @@ std::vector<CloudPoint> kept_points(const LiveMap& map, std::span<const CloudPoi
 
 }  // namespace
 
-std::vector<std::byte> encode(const MapRecordHead& head) { return encoded(head); }
+std::vector<std::byte> encode(const MapRecordHead& head) { return to_bytes(head); }
 
-std::vector<std::byte> encode(const MapRecord& record) { return encoded(record); }
+std::vector<std::byte> encode(const MapRecord& record) { return to_bytes(record); }
 
-std::optional<MapRecordHead> decode_head(std::span<const std::byte> payload) { return decoded<MapRecordHead>(payload); }
+std::optional<MapRecordHead> decode_head(std::span<const std::byte> payload) { return from_bytes<MapRecordHead>(payload); }
 
-std::optional<MapRecord> decode_record(std::span<const std::byte> payload) { return decoded<MapRecord>(payload); }
+std::optional<MapRecord> decode_record(std::span<const std::byte> payload) { return from_bytes<MapRecord>(payload); }
 
 std::optional<MapRecord> record_of_scan(const LiveMap& map, std::span<const CloudPoint> points_body, Utime utime,
                                         const Pose& T_odom_body) {

@@ -178,6 +178,24 @@ TEST(KeyframeClouds, DropsTheFarthestCloudWhenFull) {
   EXPECT_EQ(clouds.dropped(), std::ssize(dropped));
 }
 
+TEST(KeyframeClouds, MakesRoomForAWhileWhenFull) {
+  std::mt19937 generator(6);
+  KeyframeClouds clouds(kCell, 8'000);
+  int drops = 0;
+  std::int32_t id = 0;
+  for (; id < 400; ++id) {
+    clouds.add_keyframe(id, random_cloud(generator, 50, 9, 4), pose_at(id, 0, 0));
+    const auto now = clouds.beyond_bound();
+    if (now.empty()) continue;
+    ++drops;
+    clouds.drop(now);
+    EXPECT_LE(clouds.points(), 7'500U);
+    EXPECT_GT(clouds.points(), 7'400U) << "no more than a sixteenth and a cloud";
+  }
+  EXPECT_GT(drops, 10);
+  EXPECT_LT(drops, 40) << "one in ten keyframes has no place";
+}
+
 TEST(KeyframeClouds, AnOpenKeyframeAloneStaysWithinTheBoundToo) {
   std::mt19937 generator(5);
   KeyframeClouds clouds(kCell, 1'000);

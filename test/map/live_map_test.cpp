@@ -95,6 +95,48 @@ TEST(LiveMap, AsksForARebuildWhenACorrectionIsLarge) {
   EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
 }
 
+/// One place seen from thirty keyframes, so that each tile is in many clouds.
+void see_one_place_again_and_again(LiveMap& map) {
+  std::mt19937 generator(7);
+  for (int id = 0; id < 30; ++id) {
+    const Pose pose = pose_at(0.1 * id, 0, 0);
+    map.add_keyframe(keyframe(id, pose, random_cloud(generator, 500, 8, 3)));
+    map.insert_scan(random_cloud(generator, 20, 8, 3), pose);
+  }
+}
+
+TEST(LiveMap, LeavesItToARebuildToDropCloudsWhereManyOverlap) {
+  MapConfig config;
+  config.max_keyframe_points = 10'000;
+  config.reanchor_points = 5'000;  // less than there is to be read again
+  LiveMap map(config);
+  see_one_place_again_and_again(map);
+  EXPECT_TRUE(map.needs_rebuild());
+  EXPECT_EQ(map.clouds().dropped(), 0) << "the map shows them still";
+  EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
+
+  const RebuildJob job = map.begin_rebuild();
+  map.insert_scan({}, pose_at(3, 0, 0));
+  EXPECT_EQ(map.clouds().dropped(), 0) << "nor while it is built";
+  map.finish_rebuild(rebuild(job));
+  EXPECT_GT(map.clouds().dropped(), 0);
+  EXPECT_LE(map.clouds().points(), 10'000U);
+  EXPECT_FALSE(map.needs_rebuild());
+  EXPECT_FALSE(map.voxels().contains(0)) << "the farthest cloud";
+  EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
+}
+
+TEST(LiveMap, DropsCloudsAtOnceWhereThatIsLittleWork) {
+  MapConfig config;
+  config.max_keyframe_points = 10'000;
+  LiveMap map(config);
+  see_one_place_again_and_again(map);
+  EXPECT_FALSE(map.needs_rebuild());
+  EXPECT_GT(map.clouds().dropped(), 0);
+  EXPECT_LE(map.clouds().points(), 10'000U);
+  EXPECT_EQ(map.voxels().fingerprint(), fresh_fingerprint(map));
+}
+
 TEST(LiveMap, TheWayToAMapDoesNotMatter) {
   LiveMap at_once(MapConfig{});
   LiveMap aside(rebuilding_aside());
