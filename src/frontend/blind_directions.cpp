@@ -75,7 +75,7 @@ DegeneracyAnalysis BlindDirections::add_scan(const Matrix6d& sensitivity, const 
   if (held_scans_ < kMostHeldScans) average_direction(sensitivity);
   std::array<double, 6> needed;
   for (std::size_t i = 0; i < 6; ++i) needed[i] = limits.min_signal_to_noise * (blind_[i] ? kRelease : 1.0);
-  blind_ = blind_among(held_basis_, recent, needed, limits.min_sensitivity);
+  blind_ = blind_among(held_basis_, recent, needed, limits);
   const std::array<bool, 6> turning = turning_among(held_basis_, blind_, recent);
   const DegeneracyAnalysis held = without_blind(held_basis_, recent, blind_, turning, limits.min_sensitivity);
   disagreeing_ = newest.degenerate_directions > held.degenerate_directions ? disagreeing_ + 1 : 0;

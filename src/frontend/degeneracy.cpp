@@ -49,12 +49,14 @@ ScaledSensitivity::ScaledSensitivity(const Matrix6d& sensitivity, const Matrix6d
 }
 
 std::array<bool, 6> blind_among(const Matrix6d& basis, const ScaledSensitivity& scan,
-                                const std::array<double, 6>& needed, double min_sensitivity) {
+                                const std::array<double, 6>& needed, const DegeneracyLimits& limits) {
+  const double least_of_shift = std::max(limits.min_sensitivity, limits.min_shift_sensitivity);
   std::array<bool, 6> blind{};
   for (std::size_t i = 0; i < 6; ++i) {
     const Vector6d direction = basis.col(static_cast<Eigen::Index>(i));
     const double value = signal(direction, scan.value);
-    blind[i] = value < min_sensitivity || value < needed[i] * signal(direction, scan.noise);
+    const double least = is_mostly_shift(direction) ? least_of_shift : limits.min_sensitivity;
+    blind[i] = value < least || value < needed[i] * signal(direction, scan.noise);
   }
   return blind;
 }
@@ -122,7 +124,7 @@ DegeneracyAnalysis analyse_degeneracy(const Matrix6d& sensitivity, const Matrix6
   std::array<double, 6> needed;
   needed.fill(limits.min_signal_to_noise);
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(scan.value);
-  const std::array<bool, 6> blind = blind_among(solver.eigenvectors(), scan, needed, limits.min_sensitivity);
+  const std::array<bool, 6> blind = blind_among(solver.eigenvectors(), scan, needed, limits);
   // A single scan is too little to tell a bend from chance.
   return without_blind(solver.eigenvectors(), scan, blind, {}, limits.min_sensitivity);
 }

@@ -11,9 +11,10 @@ namespace ignis {
 
 /// What tells an observed direction of the pose from one that only seems so.
 struct DegeneracyLimits {
-  double length_m = 1.0;           ///< mean range of the points: makes attitude and position comparable
-  double min_sensitivity = 0.0;    ///< mean squared sensitivity per point below which a direction is degenerate
-  double min_signal_to_noise = 0;  ///< the same, relative to what the errors of the normals alone make of it
+  double length_m = 1.0;               ///< mean range of the points: makes attitude and position comparable
+  double min_sensitivity = 0.0;        ///< mean squared sensitivity per point below which a direction is degenerate
+  double min_signal_to_noise = 0;      ///< the same, relative to what the errors of the normals alone make of it
+  double min_shift_sensitivity = 0.0;  ///< for a direction that is mostly a shift, beside min_sensitivity
 };
 
 /// What a scan says of each direction, in coordinates in which all six are of one kind: (length x attitude, position).
@@ -61,7 +62,7 @@ struct DegeneracyAnalysis {
 /// Which of given orthonormal directions, the columns of `basis`, a scan does not observe; `needed` is the signal to
 /// noise that each needs.
 [[nodiscard]] std::array<bool, 6> blind_among(const Matrix6d& basis, const ScaledSensitivity& scan,
-                                              const std::array<double, 6>& needed, double min_sensitivity);
+                                              const std::array<double, 6>& needed, const DegeneracyLimits& limits);
 
 /// Which of the `blind` ones that are mostly shifts turn all the same.
 ///

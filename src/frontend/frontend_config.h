@@ -61,6 +61,7 @@ struct FrontendConfig {
   double degeneracy_signal_to_noise = 1.6;
   double salient_sigma = 4.0;
   double salient_share = 0.0015;
+  double contradiction_sigma = 5.0;
   int map_average_points = 1;
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
@@ -198,6 +199,8 @@ struct FrontendConfig {
     visit.number("salient_share", self.salient_share, {0.0, 1.0}, "1",
                  "such points as a share of all matched ones, mean of half a second of scans, below which they are "
                  "taken for chance");
+    visit.number("contradiction_sigma", self.contradiction_sigma, {0.0, 100.0}, "sigma",
+                 "velocity that scans take back from the IMU within 2 s along a hardly observed direction; 0: any");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
     visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",

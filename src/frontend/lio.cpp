@@ -18,7 +18,7 @@ constexpr std::size_t kMaxPendingScans = 40;               // two seconds of L1 
 constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a scan but a broken stamp
 constexpr std::int64_t kMinScanPeriodUs = 8'000;           // of scans that are worth the time that matching takes
 constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
-constexpr std::int64_t kHistoryUs = kMicrosPerSecond;      // IMU kept behind the committed state, for deskewing
+constexpr std::int64_t kHistoryUs = 3 * kMicrosPerSecond;  // IMU kept to deskew with and to dead reckon from
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
@@ -54,6 +54,7 @@ Lio::Lio(const FrontendConfig& config, std::int32_t session, std::string note)
       drift_(config.map_drift),
       keyframer_(config, session),
       trust_(config),
+      opinion_(config),
       start_note_(std::move(note)) {}
 
 void Lio::reset() {
@@ -73,6 +74,7 @@ void Lio::reset() {
   contradictions_ = 0;
   scans_without_correction_ = 0;
   trust_ = TrustMonitor(config_);
+  opinion_.forget();
   last_clipped_.reset();
   last_standstill_.reset();
   resumed_from_.reset();
@@ -231,6 +233,7 @@ ScanResult Lio::process(const Scan& scan) {
   }
   use_standstill(match.stats);
   note_evidence(predicted, match.stats, scan);
+  heed_second_opinion(predicted, match);
   seek_confirmation(match.stats.reason);
   match.stats.imu_disagreement = trust_.disagreement();
   follow_moving_start(match.stats.reason);
@@ -368,6 +371,7 @@ void Lio::begin_new_map() {
   ++session_;
   keyframer_ = Keyframer(config_, session_);
   trust_.note_loss();
+  opinion_.forget();
 }
 
 /// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
@@ -384,16 +388,6 @@ void Lio::use_standstill(ScanStats& stats) {
   correct_to_standstill(cautious, *standstill);
   cautious_ = cautious.covariance;
   correct_to_standstill(filter_, *standstill);
-}
-
-void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
-  stats.utime = scan.end_utime();
-  // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
-  trust_.note_scan({.stats = stats,
-                    .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
-                    .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
-                    .acceleration_sigma =
-                        std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff())});
 }
 
 }  // namespace ignis

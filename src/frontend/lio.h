@@ -18,6 +18,7 @@
 #include "frontend/scan_matcher.h"
 #include "frontend/scan_selection.h"
 #include "frontend/scan_stats.h"
+#include "frontend/second_opinion.h"
 #include "frontend/trust_monitor.h"
 #include "frontend/voxel_thinner.h"
 
@@ -98,6 +99,8 @@ class Lio {
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void follow_moving_start(ScanReason reason);
+  void heed_second_opinion(const FilterState& predicted, const MatchResult& match);
+  [[nodiscard]] FilterState dead_reckoned(FilterState from) const;
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
   void begin_new_map();
   void coast_to(Utime utime);
@@ -130,6 +133,7 @@ class Lio {
   MapDrift drift_;
   Keyframer keyframer_;
   TrustMonitor trust_;
+  SecondOpinion opinion_;
   std::deque<Scan> pending_;
   std::optional<Utime> last_scan_end_;  ///< of the newest scan that was taken into the queue
   bool running_ = false;
@@ -160,6 +164,7 @@ class Lio {
     transfer(io, lio.drift_);
     transfer(io, lio.keyframer_);
     transfer(io, lio.trust_);
+    transfer(io, lio.opinion_);
     io.maybe(lio.last_scan_end_);
     io.number(lio.running_);
     transfer(io, lio.filter_);

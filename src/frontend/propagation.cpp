@@ -15,31 +15,43 @@ constexpr std::int64_t kCoastingStepUs = 10'000;          // between samples tha
 constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;  // after a clipped sample the biases learn nothing
 constexpr double kSaturatedNoiseScale = 1e4;              // a clipped axis may be off by any amount
 
+/// Calls `step(next, input, dt)` for each piece of the line through the samples from `now` to `until`; `now` follows.
+/// `next` is the sample that the piece leads to.
+void for_each_step(const std::vector<ImuSample>& samples, Utime& now, Utime until, auto&& step) {
+  auto next = static_cast<std::size_t>(std::ranges::upper_bound(samples, now, {}, &ImuSample::utime) - samples.begin());
+  for (; now < until && next < samples.size(); ++next) {
+    const Utime step_end = std::min(until, samples[next].utime);
+    const ImuSample first = interpolate(samples[next - 1], samples[next], now);
+    const ImuSample last = interpolate(samples[next - 1], samples[next], step_end);
+    step(next, midpoint(first, last), seconds_between(now, step_end));
+    now = step_end;
+  }
+}
+
 }  // namespace
 
 void Lio::advance_to(Utime utime) {
-  const std::vector<ImuSample>& samples = imu_.samples();
-  Utime& now = filter_.nominal.utime;
-  if (utime <= now) return;
-  auto next = static_cast<std::size_t>(std::ranges::upper_bound(samples, now, {}, &ImuSample::utime) - samples.begin());
-  for (; now < utime && next < samples.size(); ++next) {
-    const ImuSample& before = samples[next - 1];
-    const ImuSample& after = samples[next];
-    if (before.utime == now) keyframer_.add_imu(before);
-    if (imu_.gap_before(next)) keyframer_.note_gap();
-    const Utime step_end = std::min(utime, after.utime);
-    const ImuSample first = interpolate(before, after, now);
-    const ImuSample last = interpolate(before, after, step_end);
-    const InertialInput input = midpoint(first, last);
-    const double dt = seconds_between(now, step_end);
-    if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
-    const ErrorStep step(filter_.nominal, input, dt, config_, noise_scale(next));
-    step.carry(cautious_);
-    step.carry(filter_.covariance);
-    filter_.nominal = predict_nominal(filter_.nominal, input, dt, config_.gravity_m);
-    now = step_end;
-    if (unaided_) unaided_->nominal.utime = now;
-  }
+  for_each_step(imu_.samples(), filter_.nominal.utime, utime,
+                [this](std::size_t next, const InertialInput& input, double dt) {
+                  const ImuSample& before = imu_.samples()[next - 1];
+                  if (before.utime == filter_.nominal.utime) keyframer_.add_imu(before);
+                  if (imu_.gap_before(next)) keyframer_.note_gap();
+                  if (unaided_) predict(*unaided_, input, dt, config_, noise_scale(next));
+                  const ErrorStep step(filter_.nominal, input, dt, config_, noise_scale(next));
+                  step.carry(cautious_);
+                  step.carry(filter_.covariance);
+                  filter_.nominal = predict_nominal(filter_.nominal, input, dt, config_.gravity_m);
+                });
+  if (unaided_) unaided_->nominal.utime = filter_.nominal.utime;
+}
+
+/// The state of the committed instant without anything but the IMU since then.
+FilterState Lio::dead_reckoned(FilterState from) const {
+  for_each_step(imu_.samples(), from.nominal.utime, filter_.nominal.utime,
+                [&](std::size_t next, const InertialInput& input, double dt) {
+                  predict(from, input, dt, config_, noise_scale(next));
+                });
+  return from;
 }
 
 double Lio::noise_scale(std::size_t sample_after) const {

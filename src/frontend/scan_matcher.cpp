@@ -87,6 +87,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
   result.stats.observability = assessment.observability;
   const bool iterated = iterate(predicted, points_body, map, result);
   result.degeneracy = degeneracy_;
+  result.facing = assessment.sensitivity.bottomRightCorner<3, 3>();
   result.map_age_scans = (map.scans() + 1.0 - mean_map_scan_) * map_noise_;
   result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
   if (!result.stats.applied()) {
@@ -208,9 +209,12 @@ ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
 }
 
 void ScanMatcher::find_observed_directions(const Assessment& assessment, const LocalMap& map) {
-  degeneracy_ =
-      blind_directions_.add_scan(assessment.sensitivity, assessment.normal_noise, map.scans() >= kYoungMapScans,
-                                 {mean_range_, config_.degeneracy_threshold, config_.degeneracy_signal_to_noise});
+  const DegeneracyLimits limits{.length_m = mean_range_,
+                                .min_sensitivity = config_.degeneracy_threshold,
+                                .min_signal_to_noise = config_.degeneracy_signal_to_noise,
+                                .min_shift_sensitivity = distrusted_};
+  degeneracy_ = blind_directions_.add_scan(assessment.sensitivity, assessment.normal_noise,
+                                           map.scans() >= kYoungMapScans, limits);
   if (degeneracy_.degenerate_directions == 0) salient_share_ = 0.0;
 }
 
@@ -308,7 +312,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
     }
   }
   Matrix6d used = result.reliable.information;
-  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0) {
+  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0 && distrusted_ == 0.0) {
     const std::optional<Matrix6d> more = step_along_degenerate(iterate, result.salient);
     if (!more) return false;
     used += *more;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
@@ -33,7 +34,8 @@ struct MatchResult {
   SalientPart salient;
   /// Projects on what `reliable` must not correct: position along directions that it leaves open, and velocity with it.
   ErrorCovariance considered = ErrorCovariance::Zero();
-  DegeneracyAnalysis degeneracy;  ///< which directions that leaves open
+  DegeneracyAnalysis degeneracy;                     ///< which directions that leaves open
+  Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();  ///< mean of n n^T over the planes, odom axes
   /// Mean age of the map points that the scan met. Times the factor by which the errors of a young map widened the
   /// covariance: all its scans share those, so that what one more of them adds is the part without.
   double map_age_scans = 1.0;
@@ -52,6 +54,10 @@ class ScanMatcher {
   [[nodiscard]] MatchResult match(const FilterState& predicted, const Pose& T_start,
                                   std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                                   int salient_since = 0);
+
+  /// A shift that was observed no better than this (mean squared sensitivity per point, 0..1) has been shown to be
+  /// wrong. From here on such shifts count as not observed, and salient points, which may be the same, say nothing.
+  void distrust(double sensitivity) { distrusted_ = std::max(distrusted_, sensitivity); }
 
  private:
   /// A point and the plane that it was associated with. The plane stays over the passes until the iterate has moved.
@@ -118,10 +124,12 @@ class ScanMatcher {
   int salient_since_ = 0;
   bool speed_is_known_ = false;
   double salient_share_ = 0.0;  ///< of the matched points, running mean over half a second of scans
+  double distrusted_ = 0.0;     ///< sensitivity up to which nothing is believed
 
   friend void transfer(auto& io, FieldsOf<ScanMatcher> auto& matcher) {
     transfer(io, matcher.blind_directions_);
     io.number(matcher.salient_share_);
+    io.number(matcher.distrusted_);
   }
 };
 

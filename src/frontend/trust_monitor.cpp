@@ -56,6 +56,7 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   if (resumed_) corrections_.clear();
   resumed_ = false;
   uncertain_start_ = false;
+  contradicted_ = false;
 }
 
 void TrustMonitor::note_uncertain_start() {
@@ -65,6 +66,12 @@ void TrustMonitor::note_uncertain_start() {
 
 void TrustMonitor::note_resumption() {
   resumed_ = true;
+  scans_to_confirm_ = kScansToConfirm;
+  corrections_.clear();
+}
+
+void TrustMonitor::note_contradiction() {
+  contradicted_ = true;
   scans_to_confirm_ = kScansToConfirm;
   corrections_.clear();
 }
@@ -132,6 +139,10 @@ std::string TrustMonitor::reason() const {
   if (resumed_)
     return std::format("resumed after a restart or a silence of both streams, {} applied scans to go",
                        scans_to_confirm_);
+  if (contradicted_) {
+    return std::format("scans took back a velocity that the IMU is sure of, it was restored ({} applied scans to go)",
+                       scans_to_confirm_);
+  }
   if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
   if (disagreement() > kMaxDisagreement) {
     return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),

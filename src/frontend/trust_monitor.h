@@ -31,7 +31,8 @@ struct ScanEvidence {
 /// One of the signals is a second opinion: returns that travel with the vehicle, or a tunnel that looks the same
 /// everywhere, give well-conditioned scans that all say "no motion". Each such scan takes a little of the velocity that
 /// the IMU has found. Corrections of a healthy filter cancel out; the sum over two seconds is compared with what
-/// accelerometer noise and bias can explain.
+/// accelerometer noise and bias can explain. Where scans hardly observe the direction, Lio takes the IMU's side
+/// (second_opinion.h).
 class TrustMonitor {
  public:
   explicit TrustMonitor(const FrontendConfig& config) : config_(config) {}
@@ -47,6 +48,8 @@ class TrustMonitor {
   /// The filter goes on from a checkpoint. Until scans have confirmed it, the pose is dead reckoning over a gap.
   void note_resumption();
   [[nodiscard]] bool awaits_confirmation() const { return resumed_; }
+  /// What scans had made of the last seconds was taken back (see second_opinion.h).
+  void note_contradiction();
   /// A start in the middle of a drive, perhaps: to the IMU constant velocity looks like rest, and only scans tell.
   void note_uncertain_start();
 
@@ -77,6 +80,7 @@ class TrustMonitor {
   bool unseen_ = false;   ///< no scan has fitted for so long that one alone does not prove the place
   bool resumed_ = false;  ///< from a checkpoint, and not yet confirmed
   bool uncertain_start_ = false;
+  bool contradicted_ = false;  ///< scans by the IMU, and not yet confirmed
   int losses_ = 0;
   double position_sigma_ = 0.0;
   double acceleration_sigma_ = 0.0;
@@ -97,6 +101,7 @@ class TrustMonitor {
     io.number(monitor.lost_);
     io.number(monitor.unseen_);
     io.number(monitor.uncertain_start_);
+    io.number(monitor.contradicted_);
     io.number(monitor.losses_);
     io.number(monitor.position_sigma_);
     io.number(monitor.acceleration_sigma_);

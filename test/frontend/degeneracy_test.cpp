@@ -26,7 +26,7 @@ Judged judged(const Planes& planes, const Matrix6d& basis) {
   const ScaledSensitivity scan(planes.sensitivity, planes.noise, kLength);
   std::array<double, 6> needed;
   needed.fill(2.0);
-  const std::array<bool, 6> blind = blind_among(basis, scan, needed, 1e-5);
+  const std::array<bool, 6> blind = blind_among(basis, scan, needed, {.min_sensitivity = 1e-5});
   return {basis, blind, turning_among(basis, blind, scan)};
 }
 

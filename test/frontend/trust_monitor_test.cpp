@@ -43,6 +43,15 @@ TEST(TrustMonitor, IsOkWhileScansAgree) {
   expect(feed.monitor, Trust::kOk, "OK");
 }
 
+TEST(TrustMonitor, IsDegradedUntilTenScansBearOutWhatWasTakenBack) {
+  Feed feed;
+  feed.monitor.note_contradiction();
+  feed.run(9);
+  expect(feed.monitor, Trust::kDegraded, "scans took back a velocity that the IMU is sure of");
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "OK");
+}
+
 TEST(TrustMonitor, FiveScansWithoutACorrectionDegradeAndTwoSecondsLose) {
   Feed feed;
   feed.evidence.stats.reason = ScanReason::kTooFewMatches;

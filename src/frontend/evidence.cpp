@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What Lio makes of a scan once the filter has taken it: how far the pose can be trusted, and whether the IMU agrees.
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/lio.h"
+
+namespace ignis {
+namespace {
+
+constexpr double kWiderThanWrong = 2.0;   // what is observed no better than this times what proved wrong is doubted
+constexpr double kMostDistrusted = 0.05;  // no good room has a direction that so few of its planes face
+
+}  // namespace
+
+void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
+  stats.utime = scan.end_utime();
+  // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
+  trust_.note_scan({.stats = stats,
+                    .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
+                    .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
+                    .acceleration_sigma =
+                        std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff())});
+}
+
+/// Where scans and the IMU contradict each other along a direction that scans hardly observe, scans are wrong.
+void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& match) {
+  if (!match.stats.applied() || !velocity_known_ || learns_nothing() || trust_.awaits_confirmation()) {
+    opinion_.forget();
+    return;
+  }
+  opinion_.note_scan({filter_.nominal, cautious_}, filter_.nominal.v_odom - predicted.nominal.v_odom, match.facing);
+  const std::optional<Contradiction> contradiction = opinion_.contradiction();
+  if (!contradiction || imu_.samples().front().utime > contradiction->since.nominal.utime) return;
+  FilterState alone = dead_reckoned(contradiction->since);
+  // The way that was not seen would be a step of the published pose: it becomes uncertainty.
+  const Eigen::Vector3d& d = contradiction->direction;
+  const Eigen::Vector3d missed =
+      d * d.dot(alone.nominal.T_odom_body.translation - filter_.nominal.T_odom_body.translation);
+  alone.nominal.T_odom_body.translation -= missed;
+  alone.covariance.block<3, 3>(kPosition, kPosition) += missed * missed.transpose();
+  // Nor did scans teach the bias along it.
+  const Eigen::Vector3d untaught = config_.accel_bias_sigma * (alone.nominal.T_odom_body.rotation.conjugate() * d);
+  alone.covariance.block<3, 3>(kAccelBias, kAccelBias) += untaught * untaught.transpose();
+  filter_ = alone;
+  cautious_ = alone.covariance;
+  matcher_.distrust(std::min(kWiderThanWrong * contradiction->sensitivity, kMostDistrusted));
+  opinion_.forget();
+  trust_.note_contradiction();
+}
+
+}  // namespace ignis
