@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What Lio makes of a scan once the filter has taken it: how far the pose can be trusted, and whether the IMU agrees.
-#include <algorithm>
 #include <cmath>
 
 #include "frontend/lio.h"
 
 namespace ignis {
-namespace {
-
-constexpr double kWiderThanWrong = 2.0;   // what is observed no better than this times what proved wrong is doubted
-constexpr double kMostDistrusted = 0.05;  // no good room has a direction that so few of its planes face
-
-}  // namespace
-
 void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
   stats.utime = scan.end_utime();
   // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
@@ -45,7 +37,7 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   alone.covariance.block<3, 3>(kAccelBias, kAccelBias) += untaught * untaught.transpose();
   filter_ = alone;
   cautious_ = alone.covariance;
-  matcher_.distrust(std::min(kWiderThanWrong * contradiction->sensitivity, kMostDistrusted));
+  matcher_.distrust_weak_shifts();
   opinion_.forget();
   trust_.note_contradiction();
 }

@@ -61,7 +61,7 @@ struct FrontendConfig {
   double degeneracy_signal_to_noise = 1.6;
   double salient_sigma = 4.0;
   double salient_share = 0.0015;
-  double contradiction_sigma = 5.0;
+  double contradiction_sigma = 4.2;
   int map_average_points = 1;
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;

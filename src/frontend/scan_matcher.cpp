@@ -25,10 +25,13 @@ constexpr double kNoisyMapPoints = 20'000.0;
 // Map points that are younger than this on average, half a second of L1 scans, may be those of something that moves: it
 // was elsewhere before. Looked for among 6, 10 and 14.
 constexpr double kScansOfANewSurface = 10.0;
-constexpr double kLeastSettledShare = 0.3;   // of a scan's planes: below, the place is new and not what is in it
-constexpr double kKnownSpeed = 0.05;         // m/s, sigma
-constexpr double kShareOfNewestScan = 0.1;   // in running means: half a second of scans
-constexpr double kKnownShift = 0.1;          // m: a direction that salient points hold so well is not reported as open
+constexpr double kLeastSettledShare = 0.3;  // of a scan's planes: below, the place is new and not what is in it
+constexpr double kKnownSpeed = 0.05;        // m/s, sigma
+constexpr double kShareOfNewestScan = 0.1;  // in running means: half a second of scans
+constexpr double kKnownShift = 0.1;         // m: a direction that salient points hold so well is not reported as open
+// Mean squared sensitivity per point of a shift that planes which are none have held: 0.001 to 0.01 in a bare corridor,
+// 0.003 to 0.02 behind a forklift. The door frames of a corridor make 0.03 and more.
+constexpr double kWeakShift = 0.02;
 constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
 constexpr auto kAll = [](const auto&) { return true; };
 
@@ -212,7 +215,7 @@ void ScanMatcher::find_observed_directions(const Assessment& assessment, const L
   const DegeneracyLimits limits{.length_m = mean_range_,
                                 .min_sensitivity = config_.degeneracy_threshold,
                                 .min_signal_to_noise = config_.degeneracy_signal_to_noise,
-                                .min_shift_sensitivity = distrusted_};
+                                .min_shift_sensitivity = distrusts_weak_shifts_ ? kWeakShift : 0.0};
   degeneracy_ = blind_directions_.add_scan(assessment.sensitivity, assessment.normal_noise,
                                            map.scans() >= kYoungMapScans, limits);
   if (degeneracy_.degenerate_directions == 0) salient_share_ = 0.0;
@@ -312,7 +315,7 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
     }
   }
   Matrix6d used = result.reliable.information;
-  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0 && distrusted_ == 0.0) {
+  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0 && !distrusts_weak_shifts_) {
     const std::optional<Matrix6d> more = step_along_degenerate(iterate, result.salient);
     if (!more) return false;
     used += *more;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
@@ -55,9 +54,9 @@ class ScanMatcher {
                                   std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                                   int salient_since = 0);
 
-  /// A shift that was observed no better than this (mean squared sensitivity per point, 0..1) has been shown to be
-  /// wrong. From here on such shifts count as not observed, and salient points, which may be the same, say nothing.
-  void distrust(double sensitivity) { distrusted_ = std::max(distrusted_, sensitivity); }
+  /// What a few planes said of a shift has been shown to be wrong. From here on shifts that so few observe count as not
+  /// observed, and salient points, which may be the same, say nothing.
+  void distrust_weak_shifts() { distrusts_weak_shifts_ = true; }
 
  private:
   /// A point and the plane that it was associated with. The plane stays over the passes until the iterate has moved.
@@ -124,12 +123,12 @@ class ScanMatcher {
   int salient_since_ = 0;
   bool speed_is_known_ = false;
   double salient_share_ = 0.0;  ///< of the matched points, running mean over half a second of scans
-  double distrusted_ = 0.0;     ///< sensitivity up to which nothing is believed
+  bool distrusts_weak_shifts_ = false;
 
   friend void transfer(auto& io, FieldsOf<ScanMatcher> auto& matcher) {
     transfer(io, matcher.blind_directions_);
     io.number(matcher.salient_share_);
-    io.number(matcher.distrusted_);
+    io.number(matcher.distrusts_weak_shifts_);
   }
 };
 

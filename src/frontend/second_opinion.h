@@ -18,7 +18,6 @@ struct Contradiction {
   FilterState since;                                     ///< before they did
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< odom axes
   double sigmas = 0.0;                                   ///< of what dead reckoning may be off by
-  double sensitivity = 0.0;                              ///< with which scans observe the direction, 0..1
 };
 
 /// What scans have made of the velocity for two seconds, held against what the IMU alone makes of it.
@@ -42,8 +41,9 @@ class SecondOpinion {
   /// Nothing before this instant can be dead reckoned.
   void forget() { marks_.clear(); }
 
-  /// Bound on what the IMU may have made of the velocity: the noise of the samples, the acceleration that a wrong
-  /// attitude or bias adds, and what was not known to begin with.
+  /// The largest along any direction that scans hardly observe. What dead reckoning may be off by: the noise of the
+  /// samples, the acceleration that a wrong attitude or bias adds, and what was not known of the velocity to begin
+  /// with.
   [[nodiscard]] std::optional<Contradiction> contradiction() const;
 
  private:
