@@ -6,6 +6,7 @@
 #include "frontend/lio.h"
 
 namespace ignis {
+
 void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
   stats.utime = scan.end_utime();
   // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
