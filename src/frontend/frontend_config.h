@@ -200,7 +200,7 @@ struct FrontendConfig {
                  "such points as a share of all matched ones, mean of half a second of scans, below which they are "
                  "taken for chance");
     visit.number("contradiction_sigma", self.contradiction_sigma, {0.0, 100.0}, "sigma",
-                 "velocity that scans take back from the IMU within 2 s along a hardly observed direction; 0: any");
+                 "velocity that scans take back from the IMU within 2 s along a hardly observed direction; 0: off");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
     visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",

@@ -132,6 +132,7 @@ void Lio::start(const FilterState& first) {
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
   if (!start_note_.empty()) trust_.note_uncertain_start();
+  opinion_.begin(first.nominal.utime);
   drift_.begin(filter_);
 }
 

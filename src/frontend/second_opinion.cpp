@@ -9,6 +9,8 @@ namespace ignis {
 namespace {
 
 constexpr double kWindowSeconds = 2.0;      // over which scans and IMU are compared
+constexpr double kStartSeconds = 3.0;       // that show whether the vehicle stood
+constexpr double kMovingSeconds = 10.0;     // until what was wrong with a start in motion is forgotten
 constexpr double kMarkSeconds = 0.5;        // between two marks
 constexpr double kShareOfNewestScan = 0.1;  // in running means: half a second of scans
 // Beyond this share of planes that face along a direction, scans know better. Along the axis of a corridor that planes
@@ -16,6 +18,11 @@ constexpr double kShareOfNewestScan = 0.1;  // in running means: half a second o
 constexpr double kMostSensitivity = 0.2;
 
 }  // namespace
+
+void SecondOpinion::begin(Utime start) {
+  forget();
+  silent_until_ = start + to_micros(kStartSeconds);
+}
 
 void SecondOpinion::note_scan(const FilterState& corrected, const Eigen::Vector3d& velocity_correction,
                               const Eigen::Matrix3d& facing) {
@@ -30,8 +37,17 @@ void SecondOpinion::note_scan(const FilterState& corrected, const Eigen::Vector3
   }
 }
 
-std::optional<Contradiction> SecondOpinion::contradiction() const {
-  if (marks_.empty() || config_.contradiction_sigma <= 0.0) return std::nullopt;
+std::optional<Contradiction> SecondOpinion::contradiction() {
+  if (config_.contradiction_sigma <= 0.0) return std::nullopt;
+  std::optional<Contradiction> found = largest();
+  if (!found || found->sigmas < config_.contradiction_sigma) return std::nullopt;
+  if (newest_ >= silent_until_) return found;
+  silent_until_ = newest_ + to_micros(kMovingSeconds);
+  return std::nullopt;
+}
+
+std::optional<Contradiction> SecondOpinion::largest() const {
+  if (marks_.empty()) return std::nullopt;
   const Mark& oldest = marks_.front();
   const double seconds = seconds_between(oldest.state.nominal.utime, newest_);
   if (seconds < kMarkSeconds) return std::nullopt;
@@ -48,7 +64,7 @@ std::optional<Contradiction> SecondOpinion::contradiction() const {
     result.direction = direction;
     result.sigmas = sigmas;
   }
-  return result.sigmas >= config_.contradiction_sigma ? std::optional(result) : std::nullopt;
+  return result;
 }
 
 }  // namespace ignis

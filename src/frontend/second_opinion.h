@@ -38,15 +38,21 @@ class SecondOpinion {
   void note_scan(const FilterState& corrected, const Eigen::Vector3d& velocity_correction,
                  const Eigen::Matrix3d& facing);
 
+  /// A start at this instant. To the IMU constant velocity looks like rest: whoever disagrees with scans in the first
+  /// three seconds has begun in motion and is not heard for ten more.
+  void begin(Utime start);
+
   /// Nothing before this instant can be dead reckoned.
   void forget() { marks_.clear(); }
 
   /// The largest along any direction that scans hardly observe. What dead reckoning may be off by: the noise of the
   /// samples, the acceleration that a wrong attitude or bias adds, and what was not known of the velocity to begin
   /// with.
-  [[nodiscard]] std::optional<Contradiction> contradiction() const;
+  [[nodiscard]] std::optional<Contradiction> contradiction();
 
  private:
+  [[nodiscard]] std::optional<Contradiction> largest() const;
+
   /// An instant from which the drive could be dead reckoned.
   struct Mark {
     FilterState state;
@@ -54,7 +60,8 @@ class SecondOpinion {
   };
 
   FrontendConfig config_;
-  std::vector<Mark> marks_;                           ///< the last two seconds, ascending
+  std::vector<Mark> marks_;  ///< the last two seconds, ascending
+  Utime silent_until_ = 0;
   Utime newest_ = 0;                                  ///< of the last scan
   Eigen::Matrix3d facing_ = Eigen::Matrix3d::Zero();  ///< running mean over half a second of scans
 
@@ -65,6 +72,7 @@ class SecondOpinion {
 
   friend void transfer(auto& io, FieldsOf<SecondOpinion> auto& opinion) {
     io.list(opinion.marks_);
+    io.number(opinion.silent_until_);
     io.number(opinion.newest_);
     io.matrix(opinion.facing_);
   }
