@@ -145,8 +145,8 @@ class LiveMap {
   std::int32_t drawn_revision_ = 0;
   std::int32_t rebuilt_revision_ = 0;  // that the rebuild under way will show
   bool drawing_ = true;
-  bool moved_far_ = false;              // keyframes, so that only a rebuild brings the map to them
-  std::vector<std::int32_t> leaving_;   // clouds beyond the bound, for the next rebuild to leave out
+  bool moved_far_ = false;             // keyframes, so that only a rebuild brings the map to them
+  std::vector<std::int32_t> leaving_;  // clouds beyond the bound, for the next rebuild to leave out
   bool rebuilding_ = false;
   std::span<const std::uint32_t> newest_kept_;
   std::vector<Arrival> arrivals_;  // since the rebuild under way began

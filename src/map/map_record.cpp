@@ -43,7 +43,9 @@ std::vector<std::byte> encode(const MapRecordHead& head) { return to_bytes(head)
 
 std::vector<std::byte> encode(const MapRecord& record) { return to_bytes(record); }
 
-std::optional<MapRecordHead> decode_head(std::span<const std::byte> payload) { return from_bytes<MapRecordHead>(payload); }
+std::optional<MapRecordHead> decode_head(std::span<const std::byte> payload) {
+  return from_bytes<MapRecordHead>(payload);
+}
 
 std::optional<MapRecord> decode_record(std::span<const std::byte> payload) { return from_bytes<MapRecord>(payload); }
 
