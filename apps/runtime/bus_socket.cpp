@@ -2,54 +2,17 @@
 #include "runtime/bus_socket.h"
 
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <filesystem>
-#include <system_error>
 #include <vector>
 
 #include <arpa/inet.h>
-#include <linux/filter.h>
-#include <linux/if_packet.h>
 #include <linux/sock_diag.h>
-#include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
 namespace ignis::runtime {
 namespace {
-
-constexpr std::uint32_t kWholeMessage = 0x4C433032;  // "LC02"; a fragment begins with "LC03"
-constexpr std::uint32_t kMagicOffset = 8;            // behind the UDP header
-constexpr std::uint32_t kSmallest = 8 + 8 + 2;       // UDP header, LCM header, a channel of one letter
-
-sock_filter load(std::uint32_t offset) { return BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offset); }
-
-sock_filter load_ancillary(std::uint32_t what) {
-  return BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(SKF_AD_OFF) + what);
-}
-
-/// Classic BPF over the datagram; the accumulator decides: 0 drops it, any other value is the length kept.
-std::vector<sock_filter> program(const BusAddress& address) {
-  std::vector<sock_filter> code;
-  const auto drop_unless = [&](sock_filter jump_over_the_drop) {
-    code.push_back(jump_over_the_drop);
-    code.push_back(BPF_STMT(BPF_RET | BPF_K, 0));
-  };
-  code.push_back(BPF_STMT(BPF_LD | BPF_W | BPF_LEN, 0));
-  drop_unless(BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kSmallest, 1, 0));
-  code.push_back(load(kMagicOffset));
-  drop_unless(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kWholeMessage, 1, 0));
-  if (address.stays_home) {
-    // Our own come over the loopback interface, or as the kernel's copy of what left through another one.
-    code.push_back(load_ancillary(SKF_AD_PKTTYPE));
-    code.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, PACKET_LOOPBACK, 3, 0));
-    code.push_back(load_ancillary(SKF_AD_IFINDEX));
-    drop_unless(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, if_nametoindex("lo"), 1, 0));
-  }
-  code.push_back(BPF_STMT(BPF_RET | BPF_K, 0xFFFFFFFF));
-  return code;
-}
 
 bool is_bus_socket(int descriptor, std::uint16_t port) {
   int type = 0;
@@ -111,14 +74,15 @@ std::optional<BusAddress> BusAddress::parse(const std::string& url) {
 std::optional<BusSocket> BusSocket::guard(const BusAddress& address) {
   const std::vector<int> sockets = bus_sockets(address.port);
   if (sockets.empty()) return std::nullopt;
-  std::vector<sock_filter> code = program(address);
-  const sock_fprog filter{.len = static_cast<unsigned short>(code.size()), .filter = code.data()};
-  for (const int descriptor : sockets) {
-    if (setsockopt(descriptor, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof filter) != 0) {
-      throw std::system_error(errno, std::system_category(), "the filter in front of the bus");
-    }
-  }
-  return BusSocket(sockets.back());
+  const BusFilter filter{.stays_home = address.stays_home};
+  for (const int descriptor : sockets) filter.attach(descriptor);
+  return BusSocket(sockets.back(), filter);
+}
+
+void BusSocket::ignore(const std::vector<UdpAddress>& senders) {
+  if (senders == filter_.unheard) return;
+  filter_.unheard = senders;
+  filter_.attach(descriptor_);
 }
 
 std::uint32_t BusSocket::dropped() const {

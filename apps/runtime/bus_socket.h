@@ -4,6 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
+
+#include "runtime/bus_filter.h"
 
 namespace ignis::runtime {
 
@@ -17,23 +21,25 @@ struct BusAddress {
   static std::optional<BusAddress> parse(const std::string& url);
 };
 
-/// Stands in front of LCM's receiving socket with a filter in the kernel. All our messages fit one datagram, so no
-/// fragment is ever ours: what is refused here costs LCM no buffer (a fragment may announce 256 MB) and never meets its
-/// reassembly, which adds offset and size in 32 bits (upstream's pull request 628). With ttl=0, datagrams from other
-/// computers are refused too. What is refused, and what found the buffer full, the kernel counts.
+/// Stands in front of LCM's receiving socket with a BusFilter in the kernel. What is refused, and what found the buffer
+/// full, the kernel counts.
 class BusSocket {
  public:
   /// Finds the socket that LCM has bound in this process and puts the filter on it. Nothing when there is none (no
   /// subscription yet, another kind of bus). Throws std::system_error when the kernel refuses the filter.
   static std::optional<BusSocket> guard(const BusAddress& address);
 
+  /// From now on takes HEALTH alone from these senders, and everything from all others.
+  void ignore(const std::vector<UdpAddress>& senders);
+
   /// Datagrams that the kernel has dropped at this socket: refused by the filter, or the buffer was full.
   [[nodiscard]] std::uint32_t dropped() const;
 
  private:
-  explicit BusSocket(int descriptor) : descriptor_(descriptor) {}
+  BusSocket(int descriptor, BusFilter filter) : descriptor_(descriptor), filter_(std::move(filter)) {}
 
   int descriptor_;  // LCM's; it lives as long as the link
+  BusFilter filter_;
 };
 
 }  // namespace ignis::runtime

@@ -116,9 +116,28 @@ void LcmLink::watch_peers() {
                         .pid = message.pid,
                         .version = message.version,
                         .config_hash = message.config_hash},
-                       uptime_s());
+                       uptime_s(), message.uptime_s);
       },
       Senders::kSeveral);
+  // After the subscription: BusSocket takes every socket on the bus's port for LCM's.
+  if (address_) addresses_.emplace(*address_);
+}
+
+/// Two senders of one channel are one stream of nonsense; what the later one says is not even received.
+void LcmLink::ignore_latecomers() {
+  const double now = uptime_s();
+  if (!addresses_ || !socket_ || now - last_look_s_ < kSamplePeriod_s) return;
+  last_look_s_ = now;
+  addresses_->hear();
+  ignored_.clear();
+  std::vector<UdpAddress> unheard;
+  for (const PeerIdentity& late : peers_.latecomers(now)) {
+    const std::optional<UdpAddress> sender = addresses_->of(late.process, late.pid);
+    if (!sender) continue;
+    ignored_.push_back(late);
+    unheard.push_back(*sender);
+  }
+  socket_->ignore(unheard);
 }
 
 void LcmLink::sample_budget() {
@@ -134,6 +153,9 @@ std::string LcmLink::own_trouble() const {
     if (!text.empty() && !more.empty()) text += "; ";
     text += more;
   };
+  for (const PeerIdentity& late : ignored_) {
+    add(std::format("{} {} came later and is not listened to", late.process, late.pid));
+  }
   add(budget_.trouble());
   for (const Receiver& receiver : receivers_) {
     const std::string refusal = receiver.refusals.trouble(uptime_s());
@@ -150,6 +172,7 @@ std::int8_t LcmLink::own_state() const {
 
 void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets) {
   watch_peers();
+  ignore_latecomers();
   sample_budget();
   supervisor_.turn(progress_, uptime_s());
 

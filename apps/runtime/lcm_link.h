@@ -7,7 +7,9 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <lcm/lcm-cpp.hpp>
 
@@ -19,6 +21,7 @@
 #include "runtime/instance_lock.h"
 #include "runtime/peer_watch.h"
 #include "runtime/refusals.h"
+#include "runtime/sender_addresses.h"
 #include "runtime/sequence_tracker.h"
 #include "runtime/service_notifier.h"
 
@@ -103,6 +106,7 @@ class LcmLink {
   void take(std::span<const std::byte> data, Receiver& receiver);
   void refuse(Receiver& receiver, const std::string& reason, bool is_foreign);
   void watch_peers();
+  void ignore_latecomers();
   void sample_budget();
   void publish_health(health_t& message);
   [[nodiscard]] std::string own_trouble() const;
@@ -125,6 +129,9 @@ class LcmLink {
   BudgetWatch budget_;
   PeerWatch peers_;
   bool watching_peers_ = false;
+  std::optional<SenderAddresses> addresses_;
+  std::vector<PeerIdentity> ignored_;
+  double last_look_s_ = -1.0;
   double last_sample_s_ = -1.0;
   std::int64_t progress_ = 0;
   ServiceNotifier supervisor_;

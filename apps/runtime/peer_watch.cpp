@@ -12,7 +12,7 @@ constexpr std::size_t kMaxTextLength = 64;  // our names, versions and fingerpri
 
 }  // namespace
 
-void PeerWatch::observe(const PeerIdentity& peer, double now_s) {
+void PeerWatch::observe(const PeerIdentity& peer, double now_s, double uptime_s) {
   if (peer.process == self_.process && peer.pid == self_.pid) return;
   std::erase_if(peers_, [&](const auto& entry) { return now_s - entry.second.last_s > kForgetAfter_s; });
   const std::pair key{peer.process.substr(0, kMaxTextLength), peer.pid};
@@ -22,7 +22,10 @@ void PeerWatch::observe(const PeerIdentity& peer, double now_s) {
                 .pid = peer.pid,
                 .version = peer.version.substr(0, kMaxTextLength),
                 .config_hash = peer.config_hash.substr(0, kMaxTextLength)};
-  if (heard.messages == 0) heard.first_s = now_s;
+  if (heard.messages == 0) {
+    heard.started_s = now_s - uptime_s;
+    heard.first_s = now_s;
+  }
   heard.last_s = now_s;
   ++heard.messages;
   note_start(key.first, peer.pid, now_s);
@@ -54,15 +57,34 @@ std::string PeerWatch::disagreement(const Heard& heard) const {
 }
 
 /// Two others of one name that are both there. Tools, which name no configuration, may be there twice.
-std::string PeerWatch::twins(const Heard& a, const Heard& b, double now_s) const {
+bool PeerWatch::are_twins(const Heard& a, const Heard& b, double now_s) const {
   const bool is_no_concern =
       a.peer.process == self_.process || a.peer.config_hash.empty() || b.peer.config_hash.empty();
-  if (a.peer.process != b.peer.process || is_no_concern) return {};
+  if (a.peer.process != b.peer.process || is_no_concern) return false;
   const double gone_first_s = std::min(a.last_s, b.last_s);
-  if (now_s - gone_first_s > kForgetAfter_s) return {};
-  if (gone_first_s - std::max(a.first_s, b.first_s) < kSideBySide_s) return {};
-  return std::format("two instances of {} are on the bus (processes {} and {})", a.peer.process, a.peer.pid,
-                     b.peer.pid);
+  if (now_s - gone_first_s > kForgetAfter_s) return false;
+  return gone_first_s - std::max(a.first_s, b.first_s) >= kSideBySide_s;
+}
+
+/// In the order of names, instances of one executable stand together; one between two others may just have ended.
+std::vector<std::pair<const PeerWatch::Heard*, const PeerWatch::Heard*>> PeerWatch::twins(double now_s) const {
+  std::vector<std::pair<const Heard*, const Heard*>> found;
+  for (auto each = peers_.begin(); each != peers_.end(); ++each) {
+    for (auto other = std::next(each); other != peers_.end(); ++other) {
+      if (other->second.peer.process != each->second.peer.process) break;
+      if (are_twins(each->second, other->second, now_s)) found.emplace_back(&each->second, &other->second);
+    }
+  }
+  return found;
+}
+
+std::vector<PeerIdentity> PeerWatch::latecomers(double now_s) const {
+  std::vector<PeerIdentity> late;
+  for (const auto& [a, b] : twins(now_s)) {
+    const PeerIdentity& later = a->started_s <= b->started_s ? b->peer : a->peer;
+    if (!std::ranges::contains(late, later)) late.push_back(later);
+  }
+  return late;
 }
 
 std::string PeerWatch::trouble(double now_s) const {
@@ -74,12 +96,9 @@ std::string PeerWatch::trouble(double now_s) const {
   for (const auto& [key, heard] : peers_) {
     if (now_s - heard.last_s <= kForgetAfter_s) add(disagreement(heard));
   }
-  // In the order of names, instances of one executable stand together; one between two others may just have ended.
-  for (auto each = peers_.begin(); each != peers_.end(); ++each) {
-    for (auto other = std::next(each); other != peers_.end(); ++other) {
-      if (other->second.peer.process != each->second.peer.process) break;
-      add(twins(each->second, other->second, now_s));
-    }
+  for (const auto& [a, b] : twins(now_s)) {
+    add(std::format("two instances of {} are on the bus (processes {} and {})", a->peer.process, a->peer.pid,
+                    b->peer.pid));
   }
   for (const auto& [process, starts] : starts_) {
     if (starts.size() == kCrashLoopStarts && now_s - starts.front().heard_s <= kCrashLoopSeconds) {

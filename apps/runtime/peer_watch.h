@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace ignis::runtime {
 
@@ -41,11 +42,16 @@ class PeerWatch {
 
   explicit PeerWatch(PeerIdentity self) : self_(std::move(self)) {}
 
-  /// A HEALTH message arrived at `now_s` [s of any steady clock]. Our own are ignored.
-  void observe(const PeerIdentity& peer, double now_s);
+  /// A HEALTH message arrived at `now_s` [s of any steady clock] from a process that has lived for `uptime_s` [s]. Our
+  /// own are ignored.
+  void observe(const PeerIdentity& peer, double now_s, double uptime_s);
 
   /// What disagrees among those heard lately, in words; empty when all agree.
   [[nodiscard]] std::string trouble(double now_s) const;
+
+  /// Of executables that are there more than once: all but the one that has lived longest. That is the one that the
+  /// vehicle has gone by so far, and every process on the bus comes to the same answer.
+  [[nodiscard]] std::vector<PeerIdentity> latecomers(double now_s) const;
 
   /// Whether anything of that needs a person: every disagreement does, since no process can mend it.
   [[nodiscard]] bool needs_person(double now_s) const { return !trouble(now_s).empty(); }
@@ -53,6 +59,7 @@ class PeerWatch {
  private:
   struct Heard {
     PeerIdentity peer;
+    double started_s = 0.0;  // by our clock
     double first_s = 0.0;
     double last_s = 0.0;
     int messages = 0;
@@ -62,7 +69,8 @@ class PeerWatch {
     double heard_s = 0.0;
   };
   [[nodiscard]] std::string disagreement(const Heard& heard) const;
-  [[nodiscard]] std::string twins(const Heard& a, const Heard& b, double now_s) const;
+  [[nodiscard]] bool are_twins(const Heard& a, const Heard& b, double now_s) const;
+  [[nodiscard]] std::vector<std::pair<const Heard*, const Heard*>> twins(double now_s) const;
   void note_start(const std::string& process, std::int32_t pid, double now_s);
 
   PeerIdentity self_;

@@ -1,29 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Row B7 between two computers: each has a driver, both on one bus (TTL 1). Nobody keeps silent about it."""
+"""Row B7 between two computers: each has a driver, both on one bus (TTL 1). All name it and go by the first."""
 
 import json
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
-from vehicle_two_computers_test import CONFIG, SCENE, URL, Computer, join
+import pytest
+from vehicle_two_computers_test import CONFIG, SCENE, URL, Computer, join, must
 
 LISTEN_S = 8.0
 FAULT = 3
-HEAR = f"""
+TAKEN = f"""
 import json, time, lcm
 from ignis_lcm.ignis import health_t
 bus = lcm.LCM("{URL}")
-newest = {{}}
+newest, taken = {{}}, {{}}
 def note(_, data):
     health = health_t.decode(data)
-    newest[f"{{health.process}} {{health.pid}}"] = [health.state, health.state_text]
+    name = f"{{health.process}} {{health.pid}}"
+    newest[name] = [health.state, health.state_text]
+    for channel, count in zip(health.channels, health.received):
+        taken.setdefault(f"{{name}} {{channel}}", []).append([health.uptime_s, count])
 bus.subscribe("HEALTH", note)
 end = time.monotonic() + {LISTEN_S}
 while time.monotonic() < end:
     bus.handle_timeout(100)
-print(json.dumps(newest))
+print(json.dumps([newest, taken]))
+"""
+# Repeats what a log of another day holds: HEALTH of the processes named on the command line, and inertial samples.
+PLAY = f"""
+import sys, time, lcm
+from ignis_lcm.ignis import health_t, imu_t
+bus = lcm.LCM("{URL}")
+for turn in range(900):
+    for name in sys.argv[1:] if turn % 100 == 0 else ():
+        health = health_t()
+        health.process, health.pid, health.config_hash, health.uptime_s = name, 7, "of another day", turn / 100
+        bus.publish("HEALTH", health.encode())
+    bus.publish("L1_IMU", b"not a message")
+    time.sleep(0.01)
 """
 
 
@@ -36,14 +54,36 @@ def start_driver(computer: Computer) -> subprocess.Popen:
     return computer.start("l1_driver", "--config", CONFIG, "--lcm-url", URL, "--port", tty)
 
 
-def hear(computer: Computer) -> dict[str, tuple[int, str]]:
-    """The newest state of each process on the bus, by name and process id."""
-    heard = computer.run(sys.executable, "-c", HEAR)
+@dataclass
+class Heard:
+    """What HEALTH told for a while: the newest state and text of each process, and its counts over time."""
+
+    newest: dict[str, tuple[int, str]]
+    counts: dict[str, list[tuple[float, int]]]
+
+    def of(self, name: str) -> tuple[int, str]:
+        """State and text of the one process of this name."""
+        (found,) = (value for key, value in self.newest.items() if key.split()[0] == name)
+        return found
+
+    def rate(self, name: str, channel: str) -> float:
+        """Messages that it took from a channel [1/s]."""
+        (series,) = (
+            value for key, value in self.counts.items() if key.split()[0] == name and key.split()[2] == channel
+        )
+        (began_s, first), (ended_s, last) = series[0], series[-1]
+        return (last - first) / (ended_s - began_s)
+
+
+def hear(computer: Computer) -> Heard:
+    heard = computer.run(sys.executable, "-c", TAKEN)
     assert heard.returncode == 0, heard.stderr[-500:]
-    return {name: (state, text) for name, (state, text) in json.loads(heard.stdout).items()}
+    return Heard(*json.loads(heard.stdout))
 
 
-def test_fault_b7_a_second_driver_on_another_computer_is_a_fault_that_every_process_names(tmp_path: Path) -> None:
+def test_fault_b7_a_second_driver_on_another_computer_is_named_by_every_process_and_not_listened_to(
+    tmp_path: Path,
+) -> None:
     folders = [tmp_path / name for name in ("near", "far")]
     for folder in folders:
         folder.mkdir()
@@ -52,8 +92,10 @@ def test_fault_b7_a_second_driver_on_another_computer_is_a_fault_that_every_proc
         join(near, far)
         near.start("lio_frontend", "--config", CONFIG, "--lcm-url", URL)
         first = start_driver(near)
+        time.sleep(2.0)
         alone = hear(near)
         second = start_driver(far)
+        time.sleep(4.0)
         both = hear(near)
         second.terminate()
         second.wait(20)
@@ -63,14 +105,48 @@ def test_fault_b7_a_second_driver_on_another_computer_is_a_fault_that_every_proc
         near.close()
         far.close()
     print(alone, both, again, sep="\n")
-    front_end = next(name for name in both if name.startswith("lio_frontend"))
-    drivers = sorted(name for name in both if name.startswith("l1_driver"))
+    drivers = sorted(name for name in both.newest if name.startswith("l1_driver"))
     assert len(drivers) == 2
-    assert "l1_driver is on the bus" not in alone[front_end][1]
+    assert "l1_driver" not in alone.of("lio_frontend")[1]
     for name in drivers:
-        state, text = both[name]
+        state, text = both.newest[name]
         assert state == FAULT and "a second l1_driver is on the bus" in text
-    state, text = both[front_end]
+    state, text = both.of("lio_frontend")
     assert state == FAULT and "two instances of l1_driver are on the bus" in text
-    assert "l1_driver" not in again[front_end][1]
+    assert f"l1_driver {second_pid(drivers, alone)} came later and is not listened to" in text
+    assert "l1_driver" not in again.of("lio_frontend")[1]
+    rates = [heard.rate("lio_frontend", "L1_IMU") for heard in (alone, both, again)]
+    assert rates == pytest.approx([250.0] * 3, rel=0.04), "samples of the first driver, and of it alone"
     assert first.returncode is None or first.returncode == 0
+
+
+def second_pid(drivers: list[str], alone: Heard) -> str:
+    """Process id of the driver that was not there before."""
+    (name,) = set(drivers) - set(alone.newest)
+    return name.split()[1]
+
+
+@pytest.mark.parametrize(
+    ("names", "ignored"), [(["l1_driver"], True), (["l1_driver", "map_builder", "graph_backend"], False)]
+)
+def test_fault_b7_who_plays_a_log_of_many_processes_is_named_and_still_heard(
+    tmp_path: Path, names: list[str], ignored: bool
+) -> None:
+    computer = Computer(tmp_path)
+    try:
+        for words in (("link", "set", "lo", "up", "multicast", "on"), ("route", "add", "224.0.0.0/4", "dev", "lo")):
+            must(computer.run("ip", *words))
+        computer.start("lio_frontend", "--config", CONFIG, "--lcm-url", URL)
+        start_driver(computer)
+        time.sleep(2.0)
+        player = subprocess.Popen(computer.line(sys.executable, "-c", PLAY, *names))
+        heard = hear(computer)
+        player.terminate()
+        player.wait(10)
+    finally:
+        computer.close()
+    print(heard)
+    text = heard.of("lio_frontend")[1]
+    assert "two instances of l1_driver are on the bus" in text
+    assert ("l1_driver 7 came later and is not listened to" in text) == ignored
+    assert ("L1_IMU: " in text) != ignored, "what it sends is no message, which is told only of what is heard"

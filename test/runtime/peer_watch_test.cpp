@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/peer_watch.h"
 
+#include <map>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 namespace ignis::runtime {
@@ -18,8 +21,8 @@ PeerIdentity peer(const std::string& process, std::int32_t pid) {
 TEST(PeerWatch, IsContentWithEqualsAndWithItself) {
   PeerWatch watch(kSelf);
   for (int i = 0; i < 10; ++i) {
-    watch.observe(kSelf, i);
-    watch.observe(peer("map_builder", 11), i);
+    watch.observe(kSelf, i, 0.0);
+    watch.observe(peer("map_builder", 11), i, 0.0);
   }
   EXPECT_EQ(watch.trouble(9.0), "");
   EXPECT_FALSE(watch.needs_person(9.0));
@@ -29,7 +32,7 @@ TEST(PeerWatch, NamesWhoseConfigurationDiffers) {
   PeerWatch watch(kSelf);
   PeerIdentity other = peer("map_builder", 11);
   other.config_hash = "bb";
-  watch.observe(other, 1.0);
+  watch.observe(other, 1.0, 0.0);
   EXPECT_EQ(watch.trouble(1.5), "configuration differs from that of map_builder (ours aa, its bb)");
   EXPECT_TRUE(watch.needs_person(1.5));
 }
@@ -38,13 +41,13 @@ TEST(PeerWatch, NamesWhoseVersionDiffers) {
   PeerWatch watch(kSelf);
   PeerIdentity other = peer("l1_driver", 12);
   other.version = "0.9";
-  watch.observe(other, 1.0);
+  watch.observe(other, 1.0, 0.0);
   EXPECT_EQ(watch.trouble(1.5), "version 1.0 differs from 0.9 of l1_driver");
 }
 
 TEST(PeerWatch, IsNotContradictedByAPeerThatSaysNothingAboutItself) {
   PeerWatch watch(kSelf);
-  watch.observe({.process = "a_tool", .pid = 12, .version = "", .config_hash = ""}, 1.0);
+  watch.observe({.process = "a_tool", .pid = 12, .version = "", .config_hash = ""}, 1.0, 0.0);
   EXPECT_EQ(watch.trouble(1.5), "");
 }
 
@@ -52,7 +55,7 @@ TEST(PeerWatch, ForgetsWhoFellSilent) {
   PeerWatch watch(kSelf);
   PeerIdentity other = peer("map_builder", 11);
   other.config_hash = "bb";
-  watch.observe(other, 1.0);
+  watch.observe(other, 1.0, 0.0);
   EXPECT_NE(watch.trouble(1.0 + PeerWatch::kForgetAfter_s), "");
   EXPECT_EQ(watch.trouble(1.1 + PeerWatch::kForgetAfter_s), "");
 }
@@ -61,17 +64,17 @@ TEST(PeerWatch, FollowsAPeerThatWasStartedAnewWithOurConfiguration) {
   PeerWatch watch(kSelf);
   PeerIdentity other = peer("map_builder", 11);
   other.config_hash = "bb";
-  watch.observe(other, 1.0);
-  watch.observe(peer("map_builder", 13), 2.0);
+  watch.observe(other, 1.0, 0.0);
+  watch.observe(peer("map_builder", 13), 2.0, 0.0);
   EXPECT_EQ(watch.trouble(1.1 + PeerWatch::kForgetAfter_s), "");
 }
 
 TEST(PeerWatch, BelievesInASecondInstanceOnlyWhenItGoesOn) {
   PeerWatch watch(kSelf);
-  watch.observe(peer("lio_frontend", 9), 0.0);  // the last word of a killed predecessor
+  watch.observe(peer("lio_frontend", 9), 0.0, 0.0);  // the last word of a killed predecessor
   EXPECT_EQ(watch.trouble(0.1), "");
-  watch.observe(peer("lio_frontend", 9), 1.0);
-  watch.observe(peer("lio_frontend", 9), 2.0);
+  watch.observe(peer("lio_frontend", 9), 1.0, 0.0);
+  watch.observe(peer("lio_frontend", 9), 2.0, 0.0);
   EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 9)");
 }
 
@@ -79,23 +82,35 @@ TEST(Fault_B7, TwoInstancesOfAnotherProcessAreNamedOnceBothHaveGoneOn) {
   PeerWatch watch(kSelf);
   const std::string both = "two instances of l1_driver are on the bus (processes 7 and 8)";
   for (int i = 0; i < 3; ++i) {
-    watch.observe(peer("l1_driver", 7), i);
-    watch.observe(peer("l1_driver", 8), i + 0.5);
+    watch.observe(peer("l1_driver", 7), i, 0.0);
+    watch.observe(peer("l1_driver", 8), i + 0.5, 0.0);
     EXPECT_EQ(watch.trouble(i + 0.6), i < 2 ? "" : both) << i;
   }
   EXPECT_TRUE(watch.needs_person(2.6));
-  watch.observe(peer("l1_driver", 7), 4.4);
+  watch.observe(peer("l1_driver", 7), 4.4, 0.0);
   EXPECT_EQ(watch.trouble(5.4), both) << "the second one may only be late";
   EXPECT_EQ(watch.trouble(5.6), "");
+}
+
+TEST(Fault_B7, AllButTheOneThatHasLivedLongestAreLatecomers) {
+  PeerWatch watch(kSelf);
+  const std::map<int, double> uptime_s{{100, 20.0}, {200, 900.0}, {300, 5.0}};
+  for (int i = 0; i < 4; ++i) {
+    for (const auto& [pid, lived_s] : uptime_s) watch.observe(peer("l1_driver", pid), i, lived_s + i);
+    watch.observe(peer("map_builder", 7), i, i);
+    EXPECT_EQ(watch.latecomers(i + 0.1).empty(), i < 2) << i << ": not believed before both have gone on for a while";
+  }
+  EXPECT_EQ(watch.latecomers(3.1), (std::vector{peer("l1_driver", 100), peer("l1_driver", 300)}));
+  EXPECT_TRUE(watch.latecomers(3.1 + PeerWatch::kForgetAfter_s).empty());
 }
 
 TEST(Fault_B7, AThirdThatHasJustEndedDoesNotHideTheOtherTwo) {
   PeerWatch watch(kSelf);
   for (int i = 0; i < 4; ++i) {
-    watch.observe(peer("l1_driver", 100), i);
-    watch.observe(peer("l1_driver", 200), i + 0.1);
+    watch.observe(peer("l1_driver", 100), i, 0.0);
+    watch.observe(peer("l1_driver", 200), i + 0.1, 0.0);
   }
-  watch.observe(peer("l1_driver", 150), 3.2);
+  watch.observe(peer("l1_driver", 150), 3.2, 0.0);
   EXPECT_EQ(watch.trouble(3.3), "two instances of l1_driver are on the bus (processes 100 and 200)");
 }
 
@@ -104,9 +119,9 @@ TEST(Fault_B7, OneThatIsStartedAnewAndToolsAreNoTwoInstances) {
   PeerIdentity tool = peer("ignis_record", 1);
   tool.config_hash.clear();
   for (int i = 0; i < 12; ++i) {
-    watch.observe(peer("l1_driver", i < 6 ? 7 : 8), 0.5 * i);
+    watch.observe(peer("l1_driver", i < 6 ? 7 : 8), 0.5 * i, 0.0);
     tool.pid = i % 2;
-    watch.observe(tool, 0.5 * i);
+    watch.observe(tool, 0.5 * i, 0.0);
     EXPECT_EQ(watch.trouble(0.5 * i + 0.1), "") << i;
   }
 }
@@ -115,12 +130,12 @@ TEST(Fault_P7, AProcessThatIsStartedFiveTimesWithinAMinuteIsNamedUntilItStays) {
   PeerWatch watch(kSelf);
   for (int start = 0; start < 5; ++start) {
     EXPECT_EQ(watch.trouble(2.0 * start), "") << start;
-    watch.observe(peer("map_builder", 100 + start), 2.0 * start);
-    watch.observe(peer("map_builder", 100 + start), 2.0 * start + 1.0);
+    watch.observe(peer("map_builder", 100 + start), 2.0 * start, 0.0);
+    watch.observe(peer("map_builder", 100 + start), 2.0 * start + 1.0, 0.0);
   }
   EXPECT_EQ(watch.trouble(9.1), "map_builder was started 5 times within 60 s");
   EXPECT_TRUE(watch.needs_person(9.1));
-  watch.observe(peer("map_builder", 104), 60.1);
+  watch.observe(peer("map_builder", 104), 60.1, 0.0);
   EXPECT_EQ(watch.trouble(60.1), "") << "the last one has stayed";
 }
 
@@ -128,7 +143,7 @@ TEST(Fault_B6, AFloodOfInventedProcessesIsRememberedInPart) {
   PeerWatch watch(kSelf);
   PeerIdentity other = peer(std::string(60'000, 'x'), 0);
   other.config_hash = other.version = std::string(60'000, 'y');
-  for (other.pid = 0; other.pid < 1000; ++other.pid) watch.observe(other, 1.0);
+  for (other.pid = 0; other.pid < 1000; ++other.pid) watch.observe(other, 1.0, 0.0);
   EXPECT_LT(watch.trouble(1.0).size(), 32 * 300U) << "it must fit into a message";
 }
 
