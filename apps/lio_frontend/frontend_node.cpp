@@ -16,7 +16,8 @@ namespace {
 namespace channels = runtime::channels;
 
 constexpr int kPollMs = 100;
-constexpr int kKeyframeRequestQueue = 100;
+constexpr int kRequestQueue = 100;
+constexpr std::size_t kMostResentParts = 24;  // in one answer, so that the live flow goes on
 constexpr Utime kCheckpointPeriod = 400'000;  // [us]
 
 /// Calls `work` and returns its result with the wall time it took [ms].
@@ -44,8 +45,11 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
   scan_counts_ = &link_.subscribe<scan_t>(channels::kScan, config_.lcm.scan_queue,
                                           [this](const scan_t& part) { on_scan_part(part); });
   request_counts_ = &link_.subscribe<keyframe_request_t>(
-      channels::kKeyframeRequest, kKeyframeRequestQueue,
-      [this](const keyframe_request_t& request) { on_request(request); }, runtime::Senders::kSeveral);
+      channels::kKeyframeRequest, kRequestQueue, [this](const keyframe_request_t& request) { on_request(request); },
+      runtime::Senders::kSeveral);
+  cloud_request_counts_ = &link_.subscribe<keyframe_request_t>(
+      channels::kCloudRequest, kRequestQueue, [this](const keyframe_request_t& request) { on_cloud_request(request); },
+      runtime::Senders::kSeveral);
 }
 
 void FrontendNode::resume() {
@@ -114,14 +118,21 @@ void FrontendNode::publish_scan(const ScanResult& scan, double milliseconds) {
   if (order_.take_scan(session, scan.state.utime, scan.covariance)) {
     publish_state(scan.state, session, &scan.covariance);
   }
+  publish_cloud(scan);
+  if (scan.keyframe) {
+    sent_clouds_.note_keyframe(scan.keyframe->id);
+    publish_keyframe(*scan.keyframe);
+  }
+}
+
+void FrontendNode::publish_cloud(const ScanResult& scan) {
   messages::PosedCloud cloud{.utime = scan.state.utime,
                              .sequence = cloud_sequence_++,
-                             .session = session,
+                             .session = scan.stats.session,
                              .applied = scan.stats.applied(),
                              .T_odom_body = scan.state.T_odom_body,
                              .points = scan.cloud};
-  for (const cloud_t& part : messages::to_messages(cloud)) link_.publish(channels::kCloud, part);
-  if (scan.keyframe) publish_keyframe(*scan.keyframe);
+  for (const cloud_t& part : sent_clouds_.add(cloud)) link_.publish(channels::kCloud, part);
 }
 
 void FrontendNode::publish_keyframe(const Keyframe& keyframe) {
@@ -138,6 +149,28 @@ void FrontendNode::on_request(const keyframe_request_t& request) {
       return;
     }
     for (const keyframe_t& part : *parts) link_.publish(channels::kKeyframe, part);
+  }
+}
+
+/// On a channel of their own: whoever follows LIO_CLOUD has had them. A keyframe goes first, so that who has a cloud
+/// has the keyframe that was made of it.
+void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
+  if (!cloud_resends_.allow(std::chrono::steady_clock::now())) {
+    ++cloud_request_counts_->rejected;
+    return;
+  }
+  std::size_t parts = 0;
+  for (const std::int32_t number : request.ids) {
+    const SentClouds::Sent* sent = sent_clouds_.find(request.session, number);
+    if (sent == nullptr) continue;
+    const std::vector<keyframe_t>* keyframe =
+        sent->keyframe ? sent_keyframes_.find(request.session, *sent->keyframe) : nullptr;
+    if (keyframe != nullptr) {
+      for (const keyframe_t& part : *keyframe) link_.publish(channels::kKeyframe, part);
+    }
+    for (const cloud_t& part : sent->parts) link_.publish(channels::kCloudAgain, part);
+    parts += sent->parts.size();
+    if (parts >= kMostResentParts) return;
   }
 }
 

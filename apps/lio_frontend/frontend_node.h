@@ -13,6 +13,7 @@
 #include "messages/sensor_messages.h"
 #include "runtime/lcm_link.h"
 #include "runtime/rate_limit.h"
+#include "sent_clouds.h"
 #include "sent_keyframes.h"
 #include "state_order.h"
 
@@ -32,8 +33,10 @@ class FrontendNode {
   void on_imu(const imu_t& message);
   void on_scan_part(const scan_t& part);
   void on_request(const keyframe_request_t& request);
+  void on_cloud_request(const keyframe_request_t& request);
   void publish_state(const NavState& state, std::int32_t session, const Matrix15d* covariance);
   void publish_scan(const ScanResult& scan, double milliseconds);
+  void publish_cloud(const ScanResult& scan);
   void publish_keyframe(const Keyframe& keyframe);
   void publish(std::span<const ScanResult> scans, double milliseconds);
   void publish_health();
@@ -46,13 +49,16 @@ class FrontendNode {
   runtime::ReceiverCounts* imu_counts_ = nullptr;
   runtime::ReceiverCounts* scan_counts_ = nullptr;
   runtime::ReceiverCounts* request_counts_ = nullptr;
+  runtime::ReceiverCounts* cloud_request_counts_ = nullptr;
   Lio lio_;
   messages::ScanAssembler assembler_;
   SentKeyframes sent_keyframes_{CheckpointFolder::kKeyframes};
+  SentClouds sent_clouds_{10 * kMicrosPerSecond, 32'000'000};  // [us], [bytes]
   std::unique_ptr<CheckpointFolder> checkpoints_;
-  std::string told_note_;            // Lio::start_note() as it was last printed
-  Utime last_checkpoint_ = 0;        // [us] scan time
-  RateLimit resends_{100.0, 100.0};  // keyframes a second; back end and map together ask for at most 85
+  std::string told_note_;                // Lio::start_note() as it was last printed
+  Utime last_checkpoint_ = 0;            // [us] scan time
+  RateLimit resends_{100.0, 100.0};      // keyframes a second; back end and map together ask for at most 85
+  RateLimit cloud_resends_{50.0, 50.0};  // answers a second; one map asks for 24 messages at a time
   Utime newest_utime_ = 0;
   StateOrder order_;
   std::int32_t state_sequence_ = 0;

@@ -7,7 +7,6 @@ namespace ignis {
 namespace {
 
 StreamFrame encode(const MapPicture* base, const MapPicture& target) {
-  const auto shared = [](std::string bytes) { return std::make_shared<const std::string>(std::move(bytes)); };
   if (base != nullptr) {
     std::optional<std::string> delta = encode_delta(*base, target);
     if (delta && delta->size() < snapshot_bytes(target)) return {false, shared(std::move(*delta))};

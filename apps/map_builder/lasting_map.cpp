@@ -11,6 +11,8 @@
 namespace ignis {
 namespace {
 
+// The front end keeps ten seconds of clouds: a parked vehicle's scans, which say nothing new, are noted in between.
+constexpr std::int32_t kMostUnwritten = 40;
 constexpr double kLongestAbsence = 60.0;  // [s] of sensor time: six times the longest pause of a supervisor
 
 std::string fingerprint_of(const MapConfig& config) {
@@ -34,16 +36,17 @@ void LastingMap::begin_journal(std::int32_t session) {
   journal_->begin({.config_fingerprint = fingerprint_, .session = session});
 }
 
-std::string LastingMap::begin_with(const messages::PosedCloud& cloud) {
+LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud) {
   if (!loaded_) return {};
   const auto began = std::chrono::steady_clock::now();
   MapJournal::Loaded loaded = *std::exchange(loaded_, std::nullopt);
-  const double absence =
-      seconds_between(std::ranges::max_element(loaded.records, {}, &MapRecord::utime)->utime, cloud.utime);
+  const MapRecord& newest = *std::ranges::max_element(loaded.records, {}, &MapRecord::utime);
+  const double absence = seconds_between(newest.utime, cloud.utime);
   if (loaded.head.session != cloud.session || !(absence > 0.0 && absence < kLongestAbsence)) {
     begin_session(cloud.session);
-    return "the journal is of another drive; the map begins anew";
+    return {"the journal is of another drive; the map begins anew"};
   }
+  number_ = written_ = newest.number;
   journal_->resume(loaded.head);
   session_ = loaded.head.session;
   for (const MapRecord& record : loaded.records) {
@@ -52,9 +55,10 @@ std::string LastingMap::begin_with(const messages::PosedCloud& cloud) {
   restore(map_, std::move(loaded.records));
   note_drops();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
-  return std::format("goes on with {} keyframes, {} voxels after {:.1f} s, built in {:.2f} s{}{}", map_.clouds().size(),
-                     map_.voxels().size(), absence, spent.count(),
-                     loaded.damage.empty() ? "" : "; not whole: ", loaded.damage);
+  return {std::format("goes on with {} keyframes, {} voxels after {:.1f} s, built in {:.2f} s{}{}",
+                      map_.clouds().size(), map_.voxels().size(), absence, spent.count(),
+                      loaded.damage.empty() ? "" : "; not whole: ", loaded.damage),
+          number_};
 }
 
 void LastingMap::begin_session(std::int32_t session) {
@@ -67,9 +71,14 @@ void LastingMap::begin_session(std::int32_t session) {
 
 InsertCounts LastingMap::insert_scan(const messages::PosedCloud& cloud) {
   const InsertCounts counts = map_.insert_scan(cloud.points, cloud.T_odom_body);
+  number_ = cloud.sequence;
   if (!journal_) return counts;
   begin_journal(cloud.session);
-  if (const auto record = record_of_scan(map_, cloud.points, cloud.utime, cloud.T_odom_body)) journal_->append(*record);
+  if (auto record = record_of_scan(map_, cloud.points, cloud.utime, cloud.T_odom_body)) {
+    write(std::move(*record));
+  } else if (const auto open = map_.clouds().open_id(); open && number_ - written_ >= kMostUnwritten) {
+    write({.id = *open, .utime = cloud.utime, .T_odom_body = cloud.T_odom_body, .points = {}});
+  }
   note_drops();
   return counts;
 }
@@ -78,9 +87,14 @@ bool LastingMap::add_keyframe(const Keyframe& keyframe) {
   if (!map_.add_keyframe(keyframe)) return false;
   if (!journal_) return true;
   begin_journal(keyframe.session);
-  journal_->append(record_of_keyframe(map_, keyframe));
+  write(record_of_keyframe(map_, keyframe));
   note_drops();
   return true;
+}
+
+void LastingMap::write(MapRecord record) {
+  record.number = written_ = number_;
+  journal_->append(record);
 }
 
 bool LastingMap::is_of_another_drive(const Keyframe& keyframe) {

@@ -28,8 +28,14 @@ class LastingMap {
   /// A journal waits for a scan that tells whether it is of this drive: keyframes come too early.
   [[nodiscard]] bool waits_for_scan() const { return loaded_.has_value(); }
 
-  /// Goes on with the journal that waits, or begins a new one. What became of it, for people; empty when none waited.
-  std::string begin_with(const messages::PosedCloud& cloud);
+  struct Beginning {
+    std::string note;  ///< what became of the journal, for people; empty when none waited
+    std::optional<std::int32_t>
+        newest{};  ///< running number of the map's newest cloud, when the journal is gone on with
+  };
+
+  /// Goes on with the journal that waits, or begins a new one.
+  Beginning begin_with(const messages::PosedCloud& cloud);
 
   /// Forgets everything: the keyframes and scans of another session or drive follow.
   void begin_session(std::int32_t session);
@@ -46,6 +52,7 @@ class LastingMap {
  private:
   void begin_journal(std::int32_t session);
   void note_drops();
+  void write(MapRecord record);
 
   std::string fingerprint_;
   LiveMap map_;
@@ -54,6 +61,8 @@ class LastingMap {
   std::optional<std::int32_t> session_;     ///< of the journal that is being written
   std::map<std::int32_t, Utime> restored_;  ///< [us] stamps of keyframes, until one that arrives has confirmed them
   std::int64_t dropped_ = 0;
+  std::int32_t number_ = 0;   ///< of the newest cloud
+  std::int32_t written_ = 0;  ///< number in the newest record
 };
 
 }  // namespace ignis

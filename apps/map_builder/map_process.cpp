@@ -6,11 +6,7 @@
 #include <iostream>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
-#include "ignis/graph_command_t.hpp"
 #include "ignis/keyframe_request_t.hpp"
-#include "map_builder/loop_clouds.h"
 #include "map_builder/part_queue.h"
 #include "runtime/channels.h"
 #include "runtime/stop_signal.h"
@@ -26,15 +22,11 @@ constexpr std::chrono::seconds kReportPeriod{1};
 constexpr std::size_t kMaxRequestedIds = 32;
 constexpr int kMaxRequests = 5;  // the front end keeps a ring: what it no longer has will never come
 
-// Complete paths are sent whenever they change, so a long drive's are sent less often.
-constexpr double kPathBytesPerSecond = 15'000.0;
-constexpr double kPathPointBytes = 12.0;
-constexpr std::chrono::milliseconds kMinPathPeriod{300};
 constexpr int kHealthQueue = 100;
 
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
+double now_s() { return seconds(std::chrono::steady_clock::now().time_since_epoch()); }
 
 }  // namespace
 
@@ -57,6 +49,12 @@ void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
   remember(link_.subscribe<cloud_t>(channels::kCloud, lcm.cloud_queue, [this](const cloud_t& message) {
     if (const auto cloud = clouds_.add(message)) on_cloud(*cloud);
   }));
+  remember(link_.subscribe<cloud_t>(
+      channels::kCloudAgain, lcm.cloud_queue,
+      [this](const cloud_t& message) {
+        if (const auto cloud = clouds_again_.add(message)) on_cloud_again(*cloud);
+      },
+      runtime::Senders::kSeveral));
   keyframe_counts_ = &link_.subscribe<keyframe_t>(channels::kKeyframe, parts, [this](const keyframe_t& message) {
     if (const auto keyframe = keyframes_.add(message)) on_keyframe(*keyframe);
   });
@@ -88,6 +86,7 @@ bool MapProcess::accept_session(std::int32_t session) {
 /// A new odom frame: nothing of the old map can be placed in it.
 void MapProcess::begin_session(std::int32_t session) {
   lasting_.begin_session(session);
+  missed_ = {};
   loops_.clear();
   graph_keyframes_ = 0;
   request_counts_.clear();
@@ -112,10 +111,37 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
     return;
   }
   if (!accept_session(cloud.session)) return;
-  if (const std::string note = lasting_.begin_with(cloud); !note.empty()) {
-    std::cerr << "map_builder: " << note << std::endl;
+  if (const LastingMap::Beginning beginning = lasting_.begin_with(cloud); !beginning.note.empty()) {
+    std::cerr << "map_builder: " << beginning.note << std::endl;
     keyframes_changed_ = true;
+    if (beginning.newest) missed_.begin(*beginning.newest, cloud.sequence, now_s());
   }
+  if (missed_.waiting()) {
+    missed_.hold(cloud, now_s());
+    catch_up();
+  } else {
+    insert(cloud);
+  }
+}
+
+void MapProcess::on_cloud_again(const messages::PosedCloud& cloud) {
+  if (!missed_.waiting() || cloud.session != session_ || !usable(cloud.T_odom_body)) return;
+  missed_.hold(cloud, now_s());
+  catch_up();
+}
+
+/// Asks for the scans of a restart, and goes on with them once they are there.
+void MapProcess::catch_up() {
+  if (!missed_.waiting()) return;
+  if (std::vector<std::int32_t> numbers = missed_.ask(now_s()); !numbers.empty()) {
+    request(channels::kCloudRequest, std::move(numbers));
+  }
+  for (const MapInput& input : missed_.take(now_s())) {
+    std::visit([this](const auto& each) { insert(each); }, input);
+  }
+}
+
+void MapProcess::insert(const messages::PosedCloud& cloud) {
   const InsertCounts counts = timed(budget_.insertion, [&] { return lasting_.insert_scan(cloud); });
   if (!cloud.points.empty() && counts.rejected == cloud.points.size()) {
     ++refused_clouds_;
@@ -129,6 +155,14 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
 void MapProcess::on_keyframe(const Keyframe& keyframe) {
   if (refuse_pose(keyframe.state.T_odom_body)) return;
   if (!accept_session(keyframe.session) || lasting_.waits_for_scan()) return;
+  if (missed_.waiting()) {
+    missed_.hold(keyframe);
+  } else {
+    insert(keyframe);
+  }
+}
+
+void MapProcess::insert(const Keyframe& keyframe) {
   if (lasting_.is_of_another_drive(keyframe)) begin_session(keyframe.session);
   if (map_.clouds().contains(keyframe.id) || !lasting_.add_keyframe(keyframe)) return;
   events_.keyframe(keyframe.state.utime, keyframe.id);
@@ -192,6 +226,7 @@ void MapProcess::run() {
       link_.handle(static_cast<int>(std::max<std::int64_t>(left, 1)));
     }
     const auto now = Clock::now();
+    catch_up();
     start_or_finish_rebuild();
     answer_viewers();
     if (now >= next_frame) {
@@ -232,95 +267,6 @@ void MapProcess::start_or_finish_rebuild() {
   });
 }
 
-void MapProcess::answer_viewers() {
-  for (const ViewerRequest& asked : server_.take_requests()) {
-    if (const auto* clouds = std::get_if<LoopCloudsRequest>(&asked.request)) answer_clouds(asked.viewer, *clouds);
-    if (const auto* command = std::get_if<LoopCommandRequest>(&asked.request)) send_command(asked.viewer, *command);
-  }
-}
-
-void MapProcess::answer_clouds(std::int64_t viewer, const LoopCloudsRequest& request) {
-  const std::vector<Eigen::Vector3f> from = map_.placed_cloud(request.from_id);
-  const std::vector<Eigen::Vector3f> to = map_.placed_cloud(request.to_id);
-  if (from.empty() || to.empty()) {
-    server_.answer(viewer, {shared(error_text("no_clouds", "the map holds no cloud of one of these keyframes")), {}});
-    return;
-  }
-  LoopClouds clouds = encode_loop_clouds(request, from, to);
-  server_.answer(viewer, {shared(std::move(clouds.text)), shared(std::move(clouds.bytes))});
-}
-
-void MapProcess::send_command(std::int64_t viewer, const LoopCommandRequest& request) {
-  graph_command_t command;
-  command.utime = hud_.map.utime;
-  command.sequence = command_sequence_++;
-  command.session = session_.value_or(-1);
-  command.command = request.veto ? graph_command_t::VETO_LOOP : graph_command_t::WITHDRAW_LOOP;
-  command.sender = "map_builder";
-  command.from_id = request.from_id;
-  command.to_id = request.to_id;
-  link_.publish(channels::kGraphCommand, command);
-  const nlohmann::ordered_json reply{{"type", "command"},
-                                     {"command", request.veto ? "veto" : "withdraw"},
-                                     {"from", request.from_id},
-                                     {"to", request.to_id},
-                                     {"sent", true}};
-  server_.answer(viewer, {shared(reply.dump()), {}});
-}
-
-void MapProcess::refresh_paths() {
-  loop_edges_ = std::make_shared<const std::vector<LoopEdge>>(map_.loop_edges());
-  if (Clock::now() < next_paths_) return;
-  odometry_path_ = std::make_shared<const std::vector<Eigen::Vector3f>>(map_.odometry_path());
-  corrected_path_ = std::make_shared<const std::vector<Eigen::Vector3f>>(map_.corrected_path());
-  const double bytes = 2.0 * kPathPointBytes * static_cast<double>(odometry_path_->size());
-  const auto period = std::chrono::duration<double>(bytes / kPathBytesPerSecond);
-  next_paths_ =
-      Clock::now() + std::max<Clock::duration>(std::chrono::duration_cast<Clock::duration>(period), kMinPathPeriod);
-}
-
-void MapProcess::make_pictures() {
-  ViewUpdate update;
-  const bool view_changed = server_.take_view_changed();
-  const std::set<double> radii = server_.view_radii();
-  if ((view_changed || map_changed_) && !radii.empty()) {
-    map_changed_ = false;
-    ++picture_number_;
-    refresh_paths();
-    pictures_ = timed(budget_.picture, [&] {
-      std::map<double, SharedPicture> pictures;
-      std::erase_if(builders_, [&](const auto& entry) { return !radii.contains(entry.first); });
-      for (const double radius : radii) {
-        MapPicture picture = builders_.try_emplace(radius, radius).first->second.build(map_.voxels());
-        picture.number = picture_number_;
-        picture.utime = hud_.map.utime;
-        picture.revision = map_.revision();
-        picture.T_map_body = map_.T_map_body();
-        picture.odometry_path = odometry_path_;
-        picture.corrected_path = corrected_path_;
-        picture.loop_edges = loop_edges_;
-        pictures[radius] = std::make_shared<const MapPicture>(std::move(picture));
-      }
-      return pictures;
-    });
-    update.pictures = pictures_;
-  }
-  publish_news(std::move(update));
-}
-
-void MapProcess::publish_news(ViewUpdate update) {
-  update.events = events_.take();
-  update.session = session_.value_or(0);
-  update.revision = map_.revision();
-  if (std::exchange(loops_changed_, false)) update.loops = shared(loops_.text());
-  if (std::exchange(keyframes_changed_, false)) {
-    KeyframeList list{.revision = map_.revision(), .entries = {}};
-    for (const auto& [id, position] : map_.keyframe_positions()) list.entries.push_back({id, position});
-    update.keyframes = std::make_shared<const KeyframeList>(std::move(list));
-  }
-  server_.publish(std::move(update));
-}
-
 void MapProcess::update_status() {
   const ThreeLevelMap& voxels = map_.voxels();
   hud_.map.voxels_local = static_cast<std::int32_t>(voxels.size(0));
@@ -350,13 +296,6 @@ void MapProcess::update_status() {
   hud_.processes = processes_.rows();
 }
 
-void MapProcess::send_hud() {
-  update_status();
-  ViewUpdate update;
-  update.hud = shared(hud_json(hud_));
-  server_.publish(std::move(update));
-}
-
 void MapProcess::report() {
   update_status();
   std::int8_t state = health_t::OK;
@@ -367,6 +306,9 @@ void MapProcess::report() {
   } else if (const std::string failure = lasting_.failure(); !failure.empty()) {
     state = health_t::DEGRADED;
     hud_.health = "DEGRADED: " + failure;
+  } else if (const std::string missing = missed_.trouble(now_s()); !missing.empty()) {
+    state = health_t::DEGRADED;
+    hud_.health = "DEGRADED: " + missing;
   } else if (const std::int64_t poses = refused_messages_ + map_.refused_poses(); refused_clouds_ + poses > 0) {
     state = health_t::DEGRADED;
     hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, poses);
@@ -380,17 +322,21 @@ void MapProcess::report() {
 }
 
 void MapProcess::request_missing_keyframes() {
-  keyframe_request_t request;
   // The newest ones may still be on their way. How many there are is another's word: no list that long is made.
-  request.ids = map_.missing_keyframes(graph_keyframes_ - 1, kMaxRequestedIds,
-                                       [this](std::int32_t id) { return request_counts_[id]++ < kMaxRequests; });
-  if (request.ids.empty()) return;
-  request.utime = hud_.map.utime;
-  request.sequence = request_sequence_++;
-  request.session = session_.value_or(0);
-  request.sender = "map_builder";
-  request.num_ids = static_cast<std::int32_t>(request.ids.size());
-  link_.publish(channels::kKeyframeRequest, request);
+  std::vector<std::int32_t> ids = map_.missing_keyframes(
+      graph_keyframes_ - 1, kMaxRequestedIds, [this](std::int32_t id) { return request_counts_[id]++ < kMaxRequests; });
+  if (!ids.empty()) request(channels::kKeyframeRequest, std::move(ids));
+}
+
+void MapProcess::request(const char* channel, std::vector<std::int32_t> ids) {
+  keyframe_request_t message;
+  message.utime = hud_.map.utime;
+  message.sequence = request_sequence_++;
+  message.session = session_.value_or(0);
+  message.sender = "map_builder";
+  message.num_ids = static_cast<std::int32_t>(ids.size());
+  message.ids = std::move(ids);
+  link_.publish(channel, message);
 }
 
 }  // namespace ignis

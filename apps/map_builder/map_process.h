@@ -13,6 +13,7 @@
 #include "map_builder/hud.h"
 #include "map_builder/lasting_map.h"
 #include "map_builder/loop_table.h"
+#include "map_builder/missed_scans.h"
 #include "map_builder/process_table.h"
 #include "map_builder/view_server.h"
 #include "messages/graph_messages.h"
@@ -44,6 +45,10 @@ class MapProcess {
   void begin_session(std::int32_t session);
   [[nodiscard]] bool refuse_pose(const Pose& pose);
   void on_cloud(const messages::PosedCloud& cloud);
+  void on_cloud_again(const messages::PosedCloud& cloud);
+  void insert(const messages::PosedCloud& cloud);
+  void insert(const Keyframe& keyframe);
+  void catch_up();
   void on_keyframe(const Keyframe& keyframe);
   void on_revision(const messages::GraphRevision& revision);
   void on_loop(const loop_result_t& loop);
@@ -61,6 +66,7 @@ class MapProcess {
   void send_hud();
   void report();
   void request_missing_keyframes();
+  void request(const char* channel, std::vector<std::int32_t> ids);
   void update_status();
 
   MapConfig map_config_;
@@ -68,7 +74,9 @@ class MapProcess {
   ViewServer server_;
   LastingMap lasting_;
   LiveMap& map_ = lasting_.live();
+  MissedScans missed_;
   messages::CloudAssembler clouds_;
+  messages::CloudAssembler clouds_again_;
   messages::KeyframeAssembler keyframes_;
   messages::RevisionAssembler revisions_;
   std::vector<const runtime::ReceiverCounts*> receivers_;

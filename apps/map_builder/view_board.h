@@ -17,6 +17,10 @@ namespace ignis {
 /// A message that several viewers share.
 using SharedBytes = std::shared_ptr<const std::string>;
 
+[[nodiscard]] inline SharedBytes shared(std::string bytes) {
+  return std::make_shared<const std::string>(std::move(bytes));
+}
+
 /// Where the keyframes stand in map [m], ascending ids.
 struct KeyframeList {
   struct Entry {

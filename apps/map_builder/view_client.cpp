@@ -33,8 +33,6 @@ constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one st
 constexpr std::chrono::seconds kLifeTimeout{10};
 constexpr std::chrono::milliseconds kSlowRoundTrip{500};
 
-SharedBytes shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
-
 }  // namespace
 
 ViewClient::ViewClient(std::int64_t id, Stream stream, ViewerContext& context)

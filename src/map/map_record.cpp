@@ -23,6 +23,7 @@ void transfer(auto& io, FieldsOf<MapRecord> auto& record) {
   io.number(record.is_keyframe);
   io.number(record.is_late);
   io.number(record.utime);
+  io.number(record.number);
   transfer(io, record.T_odom_body);
   io.list(record.points);
 }

@@ -16,7 +16,7 @@
 /// in apps/map_builder.
 namespace ignis {
 
-inline constexpr std::uint32_t kMapRecordVersion = 1;
+inline constexpr std::uint32_t kMapRecordVersion = 2;
 
 /// What the records of one file belong to. Another version, configuration or session makes them useless.
 struct MapRecordHead {
@@ -31,8 +31,9 @@ struct MapRecordHead {
 struct MapRecord {
   std::int32_t id = KeyframeClouds::kBeforeFirst;  ///< of the keyframe, or of the one that the scan was added to
   bool is_keyframe = false;
-  bool is_late = false;  ///< a keyframe that came after a successor
-  Utime utime = 0;       ///< [us] of the pose
+  bool is_late = false;     ///< a keyframe that came after a successor
+  Utime utime = 0;          ///< [us] of the pose
+  std::int32_t number = 0;  ///< running number of the newest cloud that the map had then
   Pose T_odom_body;
   std::vector<CloudPoint> points;  ///< [m] body frame, those that the map keeps; where it carves, all
 };

@@ -63,6 +63,7 @@ class FaultRun:
         map_options: tuple[str | Path, ...] = (),
     ) -> None:
         self.seen = Seen()
+        self.killed: set[str] = set()  # and not yet started again
         self.hostile: set[int] = set()  # hashes of what the tests themselves have sent
         self.pipeline = Pipeline(folder, BUS)
         self.bus = lcm.LCM(BUS)
@@ -93,8 +94,18 @@ class FaultRun:
 
     def kill_and_restart(self, name: str) -> None:
         """Kills a process and starts it again at once."""
+        self.kill(name)
+        self.restart(name)
+
+    def kill(self, name: str) -> None:
+        """Kills a process; nobody minds that it is gone until it is started again."""
+        self.killed.add(name)
         self.pipeline.processes[name].kill()
         self.pipeline.processes[name].wait()
+
+    def restart(self, name: str) -> None:
+        """Starts one again that was killed."""
+        self.killed.discard(name)
         self._start(name)
 
     def __exit__(self, *_: object) -> None:
@@ -133,7 +144,7 @@ class FaultRun:
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0:
             self.bus.handle_timeout(max(int(1000 * left), 1))
-        self.pipeline.check("lcm-logplayer")
+        self.pipeline.check("lcm-logplayer", *self.killed)
 
     def play(self, log: Path, meanwhile: Callable[[float], None] = lambda _: None, speed: float = SPEED) -> None:
         """Plays the sensor's part of a log; `meanwhile` is called often with the seconds since the start."""
@@ -143,7 +154,7 @@ class FaultRun:
             for _ in range(20):
                 self.bus.handle_timeout(2)
             meanwhile(time.monotonic() - began)
-            self.pipeline.check("lcm-logplayer")
+            self.pipeline.check("lcm-logplayer", *self.killed)
         assert player.returncode == 0
         self.listen(3.5)  # a full set of poses comes every two seconds, HEALTH every second
 

@@ -47,10 +47,12 @@ def test_fault_b5_damaged_messages_leave_graph_and_keyframes_as_they_are(
             ("lio_frontend", "L1_IMU"),
             ("lio_frontend", "L1_SCAN"),
             ("lio_frontend", "KEYFRAME_REQUEST"),
+            ("lio_frontend", "CLOUD_REQUEST"),
             ("graph_backend", "LIO_KEYFRAME"),
             ("graph_backend", "LIO_STATE"),
             ("graph_backend", "GRAPH_COMMAND"),
             ("map_builder", "LIO_CLOUD"),
+            ("map_builder", "LIO_CLOUD_AGAIN"),
             ("map_builder", "SMOOTHED_KEYFRAMES"),
             ("map_builder", "LOOP_RESULT"),
             ("map_builder", "LIO_SCAN_STATS"),
@@ -162,7 +164,11 @@ def test_fault_b6_a_flood_does_not_stop_the_pose(drive_log: Path, undisturbed: S
     request = types.keyframe_request_t()
     request.ids = list(range(16))
     request.num_ids = len(request.ids)
-    floods = [("L1_IMU", types.scan_t().encode()), ("KEYFRAME_REQUEST", request.encode())]
+    floods = [
+            ("L1_IMU", types.scan_t().encode()),
+            ("KEYFRAME_REQUEST", request.encode()),
+            ("CLOUD_REQUEST", request.encode()),
+        ]
     sent = 0
     with FaultRun(tmp_path, ("lio_frontend",)) as run:
 

@@ -19,7 +19,7 @@ PROCESSES = ("lio_frontend", "graph_backend", "map_builder", "l1_driver")
 SEED = 77
 STOPS = 6
 STOP_WITHIN_S = 2.0
-LEAST_VOXEL_SHARE = 0.87  # the scans of the restart are gone
+LEAST_VOXEL_SHARE = 0.99  # two drives in real time are never quite the same
 
 
 def arguments(process: str, folder: Path) -> list[object]:
@@ -184,17 +184,21 @@ def test_fault_p6_a_killed_logger_costs_the_log_at_most_a_tenth_of_a_second(
     assert sent[-1] - sent[kept - 1] < 0.1 + 0.1, "0.1 s is promised; the machine may be busy"
 
 
-def test_fault_p4_a_killed_map_goes_on_with_every_keyframe_and_nearly_all_of_its_voxels(
-    drive_log: Path, undisturbed: Seen, tmp_path: Path
+@pytest.mark.parametrize("absence_s", [0.0, 0.5, 1.5])
+def test_fault_p4_a_killed_map_goes_on_with_every_keyframe_and_all_of_its_voxels(
+    drive_log: Path, undisturbed: Seen, tmp_path: Path, absence_s: float
 ) -> None:
     killed_at = random.Random(SEED).uniform(4.0, 6.0)
     with FaultRun(tmp_path, map_options=("--journal", tmp_path / "journal")) as run:
-        state = {"killed": False}
+        waiting = ["kill", "start"]
 
         def meanwhile(seconds: float) -> None:
-            if seconds > killed_at and not state["killed"]:
-                state["killed"] = True
-                run.kill_and_restart("map_builder")
+            if waiting == ["kill", "start"] and seconds > killed_at:
+                run.kill("map_builder")
+                waiting.remove("kill")
+            if waiting == ["start"] and seconds > killed_at + absence_s:
+                run.restart("map_builder")
+                waiting.remove("start")
 
         run.play(drive_log, meanwhile)
         deadline, wanted = time.monotonic() + 10.0, len(run.seen.poses)
@@ -203,6 +207,6 @@ def test_fault_p4_a_killed_map_goes_on_with_every_keyframe_and_nearly_all_of_its
         said = run.pipeline.last_words("map_builder", 20)
     shares = [mine / all_ for mine, all_ in zip(status["voxels"], undisturbed.status["voxels"], strict=True)]
     print("seed", SEED, "killed after", killed_at, "s; share of the voxels per level", shares, said)
-    assert state["killed"] and len(undisturbed.poses) - 1 <= wanted <= status["keyframes"]
+    assert not waiting and len(undisturbed.poses) - 1 <= wanted <= status["keyframes"]
     assert "goes on with" in said
     assert min(shares) > LEAST_VOXEL_SHARE

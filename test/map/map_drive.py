@@ -39,6 +39,21 @@ class Drive:
         self.drift = drift
         self.keyframes = []
         self.last_keyframe_stamp = 0
+        self.sent = {}  # by the scan's number: what was made of it, keyframe first
+        self.asked_for = []
+        self.bus.subscribe("CLOUD_REQUEST", self._send_clouds_again)
+
+    def answer(self, seconds):
+        """Does what is asked of a front end for a while."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.bus.handle_timeout(max(1, round(1000 * left)))
+
+    def _send_clouds_again(self, _channel, data):
+        for number in types.keyframe_request_t.decode(data).ids:
+            self.asked_for.append(number)
+            for channel, message in self.sent.get(number, ()):
+                self.bus.publish(channel, message)
 
     def position(self):
         return np.array([self.drift * self.step, 0.0, -SPEED * SCAN_PERIOD * self.step])
@@ -63,6 +78,7 @@ class Drive:
         cloud.x, cloud.y, cloud.z = (list(map(float, scan[:, axis])) for axis in range(3))
         cloud.intensity = [float(100 + 10 * (i % 3)) for i in range(len(scan))]
         self.bus.publish("LIO_CLOUD", cloud.encode())
+        self.sent[self.step] = [("LIO_CLOUD_AGAIN", cloud.encode())]
 
     def publish_state(self, position):
         state = types.state_t()
@@ -91,6 +107,7 @@ class Drive:
         keyframe.intensity = bytes([50] * len(scan))
         self.keyframes.append(position)
         self.bus.publish("LIO_KEYFRAME", keyframe.encode())
+        self.sent.setdefault(self.step, []).insert(0, ("LIO_KEYFRAME", keyframe.encode()))
 
     def publish_loop(self):
         loop = types.loop_result_t()

@@ -26,18 +26,18 @@ class JournalledMap:
     def __init__(self, folder: Path, start: Callable[..., Server]) -> None:
         self.folder, self.drive = folder, Drive()
         self._start_server = start
-        self._started_at = 0
+        self._started_at = self._missed = 0
         self.start()
 
     def start(self) -> None:
         options = ("--port", "0", "--journal", self.folder / "journal", "--out", self.folder / "out")
         self.server = self._start_server(*map(str, options), url=URL)
-        self._started_at = self.drive.step
+        self._started_at = self.drive.step - self._missed
 
     def drive_to(self, step: int) -> None:
         while self.drive.step < step:
             self.drive.advance()
-            time.sleep(PAUSE_S)
+            self.drive.answer(PAUSE_S)
         self.wait_for(lambda status: status.get("clouds_inserted") == self.drive.step - self._started_at)
 
     def status(self) -> dict[str, Any]:
@@ -47,12 +47,20 @@ class JournalledMap:
         deadline = time.monotonic() + 10.0
         while not condition(status := self.status()):
             assert time.monotonic() < deadline, status
-            time.sleep(0.05)
+            self.drive.answer(0.05)
         return status
 
     def kill(self) -> None:
         self.server.process.kill()
         self.server.process.communicate()
+
+    def miss(self, scans: int, *, forgotten: bool = False) -> None:
+        """The drive goes on while no map is there; what is forgotten is never sent again."""
+        self._missed = 0 if forgotten else scans
+        for _ in range(scans):
+            self.drive.advance()
+        if forgotten:
+            self.drive.sent = {}
 
     def end(self) -> tuple[bytes, str]:
         """The map in the end, and what the last process said."""
@@ -94,6 +102,40 @@ def test_fault_p4_a_map_killed_between_scans_ends_equal_to_the_undisturbed_one_v
         assert ("goes on with" in said) == bool(kills)
     assert len(maps["killed"]) > 100_000
     assert maps["killed"] == maps["undisturbed"]
+
+
+def test_fault_p4_what_a_map_missed_while_it_was_dead_is_asked_for_and_ends_equal_voxel_for_voxel(make_map) -> None:
+    maps = {}
+    for name, absences in (("undisturbed", {}), ("killed", {3: 1, 40: 2, 41: 25, 97: 130})):
+        run = make_map(name)
+        for step, scans in absences.items():
+            run.drive_to(step + sum(count for at, count in absences.items() if at < step))
+            run.kill()
+            run.miss(scans)
+            run.start()
+        run.drive_to(300)
+        run.drive.publish_correction(1)
+        run.wait_for(lambda status: status.get("revision") == 1)
+        assert "missing" not in run.status()["health"]
+        maps[name], _ = run.end()
+        assert len(set(run.drive.asked_for)) == sum(absences.values()) + len(absences), "the newest one is asked for too"
+    assert len(maps["killed"]) > 100_000
+    assert maps["killed"] == maps["undisturbed"]
+
+
+def test_fault_p4_what_nobody_sends_again_is_given_up_and_told(make_map) -> None:
+    run = make_map()
+    run.drive_to(60)
+    run.kill()
+    run.miss(30, forgotten=True)
+    run.start()
+    began = time.monotonic()
+    run.drive_to(100)
+    waited = time.monotonic() - began
+    status = run.wait_for(lambda status: "30 scans of the map's restart are missing" in status.get("health", ""))
+    assert status["keyframes"] == 4, "three, and what comes before the first"
+    assert 1.5 < waited < 4.0
+    run.end()
 
 
 def test_fault_m4_a_damaged_journal_gives_what_is_whole_and_says_so(make_map) -> None:

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the front end's process adds to the odometry: the order of its states, and the keyframes it sends again.
+// What the front end's process adds to the odometry: the order of its states, and the keyframes and clouds it sends
+// again.
 #include <gtest/gtest.h>
 
+#include "lio_frontend/sent_clouds.h"
 #include "lio_frontend/sent_keyframes.h"
 #include "lio_frontend/state_order.h"
 
@@ -76,6 +78,48 @@ TEST(SentKeyframes, TakesNoMoreRoomThanTheMessagesNeed) {
     EXPECT_EQ(part.intensity.capacity(), part.intensity.size());
     EXPECT_EQ(part.gyro_x.capacity(), part.gyro_x.size());
   }
+}
+
+messages::PosedCloud cloud(std::int32_t number, std::size_t points) {
+  messages::PosedCloud made;
+  made.utime = 50'000 * number;
+  made.sequence = number;
+  made.session = 4;
+  made.points.resize(points, {.position = {1.0F, 2.0F, 3.0F}, .intensity = 7.0F});
+  return made;
+}
+
+TEST(SentClouds, GivesBackWhatWasSentWithTheKeyframeMadeOfIt) {
+  SentClouds sent(1'000'000, 1'000'000);
+  EXPECT_EQ(sent.add(cloud(7, 10)).size(), 1U);
+  sent.note_keyframe(3);
+  EXPECT_EQ(sent.add(cloud(8, 3000)).size(), 2U);
+  ASSERT_NE(sent.find(4, 7), nullptr);
+  EXPECT_EQ(sent.find(4, 7)->parts.front().num_points, 10);
+  EXPECT_EQ(sent.find(4, 7)->keyframe, 3);
+  EXPECT_EQ(sent.find(4, 8)->parts.size(), 2U);
+  EXPECT_EQ(sent.find(4, 8)->keyframe, std::nullopt);
+  EXPECT_EQ(sent.find(5, 7), nullptr) << "another session";
+  EXPECT_EQ(sent.find(4, 9), nullptr);
+}
+
+TEST(SentClouds, KeepsAStretchOfTime) {
+  SentClouds sent(1'000'000, 1'000'000);
+  for (std::int32_t number = 0; number < 100; ++number) sent.add(cloud(number, 10));
+  EXPECT_EQ(sent.size(), 21U);
+  EXPECT_EQ(sent.find(4, 78), nullptr);
+  EXPECT_NE(sent.find(4, 79), nullptr);
+}
+
+TEST(SentClouds, KeepsABoundedNumberOfBytesAndTheNewestInAnyCase) {
+  SentClouds sent(1'000'000'000, 100'000);
+  for (std::int32_t number = 0; number < 100; ++number) {
+    sent.add(cloud(number, 1000));
+    EXPECT_LE(sent.bytes(), 100'000U);
+  }
+  EXPECT_EQ(sent.size(), 6U);
+  sent.add(cloud(100, 20'000));
+  EXPECT_EQ(sent.size(), 1U);
 }
 
 }  // namespace
