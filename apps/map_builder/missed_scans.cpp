@@ -35,7 +35,7 @@ void MissedScans::begin(std::int32_t newest, std::int32_t first, double now_s) {
   progress_s_ = now_s;
 }
 
-void MissedScans::hold(messages::PosedCloud cloud, double now_s) {
+void MissedScans::hold(const messages::PosedCloud& cloud, double now_s) {
   if (!newest_ || cloud.sequence < *newest_) return;
   const std::int32_t number = cloud.sequence;
   // Those that arrive of themselves close no gap.
@@ -44,14 +44,11 @@ void MissedScans::hold(messages::PosedCloud cloud, double now_s) {
     newest_came_again_ = true;
     return;
   }
-  const std::size_t points = cloud.points.size();
-  if (clouds_.try_emplace(number, std::move(cloud)).second) points_ += points;
+  if (clouds_.try_emplace(number, cloud).second) points_ += cloud.points.size();
 }
 
-void MissedScans::hold(Keyframe keyframe) {
-  const std::int32_t id = keyframe.id;
-  const std::size_t points = keyframe.cloud.size();
-  if (keyframes_.try_emplace(id, std::move(keyframe)).second) points_ += points;
+void MissedScans::hold(const Keyframe& keyframe) {
+  if (keyframes_.try_emplace(keyframe.id, keyframe).second) points_ += keyframe.cloud.size();
 }
 
 bool MissedScans::has(std::int32_t number) const {

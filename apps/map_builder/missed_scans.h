@@ -45,8 +45,8 @@ class MissedScans {
   /// Whether everything that arrives has to be held back.
   [[nodiscard]] bool waiting() const { return newest_.has_value(); }
 
-  void hold(messages::PosedCloud cloud, double now_s);
-  void hold(Keyframe keyframe);
+  void hold(const messages::PosedCloud& cloud, double now_s);
+  void hold(const Keyframe& keyframe);
 
   /// Numbers of the clouds to ask for now, the newest first: the oldest go first at the front end. Often empty.
   [[nodiscard]] std::vector<std::int32_t> ask(double now_s);

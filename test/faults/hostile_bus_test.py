@@ -165,10 +165,10 @@ def test_fault_b6_a_flood_does_not_stop_the_pose(drive_log: Path, undisturbed: S
     request.ids = list(range(16))
     request.num_ids = len(request.ids)
     floods = [
-            ("L1_IMU", types.scan_t().encode()),
-            ("KEYFRAME_REQUEST", request.encode()),
-            ("CLOUD_REQUEST", request.encode()),
-        ]
+        ("L1_IMU", types.scan_t().encode()),
+        ("KEYFRAME_REQUEST", request.encode()),
+        ("CLOUD_REQUEST", request.encode()),
+    ]
     sent = 0
     with FaultRun(tmp_path, ("lio_frontend",)) as run:
 

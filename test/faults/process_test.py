@@ -188,7 +188,7 @@ def test_fault_p6_a_killed_logger_costs_the_log_at_most_a_tenth_of_a_second(
 def test_fault_p4_a_killed_map_goes_on_with_every_keyframe_and_all_of_its_voxels(
     drive_log: Path, undisturbed: Seen, tmp_path: Path, absence_s: float
 ) -> None:
-    killed_at = random.Random(SEED).uniform(4.0, 6.0)
+    killed_at = random.Random(SEED).uniform(3.0, 5.0)
     with FaultRun(tmp_path, map_options=("--journal", tmp_path / "journal")) as run:
         waiting = ["kill", "start"]
 

@@ -118,7 +118,9 @@ def test_fault_p4_what_a_map_missed_while_it_was_dead_is_asked_for_and_ends_equa
         run.wait_for(lambda status: status.get("revision") == 1)
         assert "missing" not in run.status()["health"]
         maps[name], _ = run.end()
-        assert len(set(run.drive.asked_for)) == sum(absences.values()) + len(absences), "the newest one is asked for too"
+        assert len(set(run.drive.asked_for)) == sum(absences.values()) + len(absences), (
+            "the newest one is asked for too"
+        )
     assert len(maps["killed"]) > 100_000
     assert maps["killed"] == maps["undisturbed"]
 
