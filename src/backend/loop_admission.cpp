@@ -19,7 +19,7 @@ constexpr std::size_t kMostWaiting = 100;  // the oldest is forgotten
 const Matrix6d kNothingKnown = 1e-6 * Matrix6d::Identity();
 
 ConsistencyRule rule_of(const BackendConfig& config) {
-  return {config.loop_drift_scale, config.loop_consistency_probability};
+  return {config.loop_drift_scale, ChiSquareBounds(config.loop_consistency_probability)};
 }
 
 LoopClaim claim_of(const GraphLoop& loop, const SmootherState& state) {
@@ -36,15 +36,19 @@ void note(GraphLoop& loop, const ChiSquareTest& test) {
 class Hearing {
  public:
   Hearing(const BackendConfig& config, SmootherState& state) : rule_(rule_of(config)), config_(config), state_(state) {
-    for (const GraphLoop& loop : state.loops) take(loop);
-    for (const GraphLoop& loop : state.waiting) take(loop);
-    if (loops_.size() > kMostWitnesses) {
-      std::ranges::sort(loops_, {}, &GraphLoop::number);
-      loops_.erase(loops_.begin(), loops_.end() - kMostWitnesses);
+    std::vector<const GraphLoop*> witnesses;
+    for (const GraphLoop& loop : state.loops) witnesses.push_back(&loop);
+    for (const GraphLoop& loop : state.waiting) witnesses.push_back(&loop);
+    if (witnesses.size() > kMostWitnesses) {
+      std::ranges::sort(witnesses, {}, &GraphLoop::number);
+      witnesses.erase(witnesses.begin(), witnesses.end() - kMostWitnesses);
     }
     // Pairs of loops that testify no more are never asked for again.
     if (state_.agreement.size() > kMostWitnesses * kMostWitnesses) state_.agreement.clear();
-    for (const GraphLoop& loop : loops_) claims_.push_back(claim_of(loop, state_));
+    for (const GraphLoop* loop : witnesses) {
+      numbers_.push_back(loop->number);
+      claims_.push_back(claim_of(*loop, state_));
+    }
     believe_largest_set();
   }
 
@@ -61,7 +65,7 @@ class Hearing {
     const LoopClaim& claim = claims_[place(number).value()];
     if (open_distance(claim.from, claim.to, state_.odometry, rule_) <= config_.loop_support_beyond_m) return true;
     return std::ranges::any_of(believed_, [&](std::size_t i) {
-      const std::int32_t other = loops_[i].number;
+      const std::int32_t other = numbers_[i];
       const bool testifies =
           is_in(state_.loops, other) || (is_in(state_.waiting, other) && are_apart(claim, claims_[i]));
       return other != number && testifies &&
@@ -70,12 +74,10 @@ class Hearing {
   }
 
  private:
-  void take(const GraphLoop& loop) { loops_.push_back(loop); }
-
   [[nodiscard]] std::optional<std::size_t> place(std::int32_t number) const {
-    const auto found = std::ranges::find(loops_, number, &GraphLoop::number);
-    if (found == loops_.end()) return std::nullopt;
-    return static_cast<std::size_t>(found - loops_.begin());
+    const auto found = std::ranges::find(numbers_, number);
+    if (found == numbers_.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - numbers_.begin());
   }
 
   [[nodiscard]] static bool is_in(const auto& loops, std::int32_t number) {
@@ -90,7 +92,7 @@ class Hearing {
   }
 
   bool agree(std::size_t i, std::size_t k) {
-    const auto [first, second] = std::minmax(loops_[i].number, loops_[k].number);
+    const auto [first, second] = std::minmax(numbers_[i], numbers_[k]);
     const std::uint64_t pair = (static_cast<std::uint64_t>(first) << 32U) | static_cast<std::uint32_t>(second);
     const auto known = state_.agreement.find(pair);
     if (known != state_.agreement.end()) return known->second;
@@ -112,9 +114,9 @@ class Hearing {
   ConsistencyRule rule_;
   const BackendConfig& config_;
   SmootherState& state_;
-  std::vector<GraphLoop> loops_;
-  std::vector<LoopClaim> claims_;
-  std::vector<std::size_t> believed_;  ///< places in loops_, ascending
+  std::vector<std::int32_t> numbers_;  ///< of the loops that testify
+  std::vector<LoopClaim> claims_;      ///< theirs
+  std::vector<std::size_t> believed_;  ///< places in claims_, ascending
 };
 
 /// Takes out, worst first, every loop that the graph contradicts.

@@ -13,7 +13,7 @@ namespace {
 
 ChiSquareTest test(const Vector6d& error, const Matrix6d& covariance, int directions, const ConsistencyRule& rule) {
   const Matrix6d scaled = rule.sigma_scale * rule.sigma_scale * covariance;
-  return {error.dot(scaled.ldlt().solve(error)), chi_square_bound(directions, rule.probability)};
+  return {error.dot(scaled.ldlt().solve(error)), rule.bounds.of(directions)};
 }
 
 /// Covariance of loop `a` minus the way round through loop `b`, in body axes of a.from.
@@ -33,8 +33,10 @@ double largest_position_sigma(const Matrix6d& covariance, const ConsistencyRule&
 
 }  // namespace
 
-double chi_square_bound(Eigen::Index directions, double probability) {
-  return boost::math::quantile(boost::math::chi_squared(static_cast<double>(directions)), probability);
+ChiSquareBounds::ChiSquareBounds(double probability) {
+  for (std::size_t i = 1; i < bounds_.size(); ++i) {
+    bounds_[i] = boost::math::quantile(boost::math::chi_squared(static_cast<double>(i)), probability);
+  }
 }
 
 ChiSquareTest test_against_odometry(const LoopClaim& loop, const OdometryChain& odometry, const ConsistencyRule& rule) {

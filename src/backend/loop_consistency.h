@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -22,9 +24,19 @@ struct LoopClaim {
   int directions = 6;                          ///< in which it says something
 };
 
+/// The largest chi-square that is believed of an error, by its degrees of freedom: quantiles, looked up once.
+class ChiSquareBounds {
+ public:
+  explicit ChiSquareBounds(double probability);
+  [[nodiscard]] double of(Eigen::Index directions) const { return bounds_.at(static_cast<std::size_t>(directions)); }
+
+ private:
+  std::array<double, 7> bounds_{};  ///< of none to six
+};
+
 struct ConsistencyRule {
-  double sigma_scale = 1.0;    ///< factor on all sigmas: errors of odometry are correlated
-  double probability = 0.999;  ///< quantile of the chi-square distribution that is still believed
+  double sigma_scale = 1.0;  ///< factor on all sigmas: errors of odometry are correlated
+  ChiSquareBounds bounds{0.999};
 };
 
 struct ChiSquareTest {
@@ -32,9 +44,6 @@ struct ChiSquareTest {
   double bound = 0.0;
   [[nodiscard]] bool passed() const { return value <= bound; }  ///< false for what is not a number
 };
-
-/// The largest chi-square that is believed of an error with `directions` degrees of freedom.
-[[nodiscard]] double chi_square_bound(Eigen::Index directions, double probability);
 
 /// The loop against the odometry between its ends.
 [[nodiscard]] ChiSquareTest test_against_odometry(const LoopClaim& loop, const OdometryChain& odometry,

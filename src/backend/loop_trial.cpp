@@ -27,12 +27,11 @@ struct Suspect {
   double share;  ///< own chi-square over its bound
 };
 
-std::vector<Suspect> suspects_of(const BackendConfig& config, IncrementalSolver& solver, const SmootherState& state) {
+std::vector<Suspect> suspects_of(const ChiSquareBounds& bounds, IncrementalSolver& solver, const SmootherState& state) {
   std::vector<Suspect> suspects;
   for (std::size_t i = 0; i < state.loops.size(); ++i) {
     const GraphLoop& loop = state.loops[i];
-    const double bound = chi_square_bound(loop.rows.rows(), config.loop_consistency_probability);
-    suspects.push_back({i, 2.0 * solver.half_chi_square(loop.factor) / bound});
+    suspects.push_back({i, 2.0 * solver.half_chi_square(loop.factor) / bounds.of(loop.rows.rows())});
   }
   std::ranges::stable_sort(suspects, std::ranges::greater(), &Suspect::share);
   return suspects;
@@ -52,19 +51,24 @@ double cost_of(const GraphLoop& loop, const SmootherState& state, const Matrix6d
 }  // namespace
 
 LoopEntry enter_graph(GraphLoop loop, const BackendConfig& config, IncrementalSolver& solver, SmootherState& state) {
-  const double before = solver.half_chi_square();
   gtsam::NonlinearFactorGraph factors;
   factors.push_back(
       make_relative_pose_factor(X(loop.result.to_id), X(loop.result.from_id), loop.result.T_to_from, loop.rows));
+  const double bound = ChiSquareBounds(config.loop_consistency_probability).of(loop.rows.rows());
+  // The graph's chi-square cannot rise by more than what the loop would cost if nothing gave way. Where that is little,
+  // as among the hundreds of loops of a place that is driven again and again, nobody need add up all factors.
+  double rise = 2.0 * factors.error(solver.estimate_of(factors.front()->keys()));
+  const bool may_contradict = !(rise <= bound);
+  const double before = may_contradict ? solver.half_chi_square() : 0.0;
   const SolverOutcome outcome = solver.add(factors, {});
   if (!outcome.accepted) return {false, outcome.reason, 0.0};
   loop.factor = outcome.factors.front();
   loop.entered_id = state.nodes.back().end.id;
   loop.result.stage = LoopStage::kOnTrial;
   loop.result.reason = LoopReason::kAccepted;
-  double rise = 2.0 * (solver.half_chi_square() - before);
+  if (may_contradict) rise = 2.0 * (solver.half_chi_square() - before);
   // What is linearised elsewhere may look like a contradiction. A small correction settles with the next keyframe.
-  if (!(rise <= chi_square_bound(loop.rows.rows(), config.loop_consistency_probability))) {
+  if (!(rise <= bound)) {
     solver.settle(kUpdatesAfterLoop);
     rise = 2.0 * (solver.half_chi_square() - before);
   }
@@ -90,10 +94,9 @@ GraphLoop leave_graph(std::size_t index, const std::string& reason_text, Increme
 std::optional<ContradictedLoop> contradicted_loop(double newest_rise, const BackendConfig& config,
                                                   IncrementalSolver& solver, const SmootherState& state) {
   if (state.loops.empty()) return std::nullopt;
-  const auto bound_of = [&](std::size_t i) {
-    return chi_square_bound(state.loops[i].rows.rows(), config.loop_consistency_probability);
-  };
-  std::vector<Suspect> suspects = suspects_of(config, solver, state);
+  const ChiSquareBounds bounds(config.loop_consistency_probability);
+  const auto bound_of = [&](std::size_t i) { return bounds.of(state.loops[i].rows.rows()); };
+  std::vector<Suspect> suspects = suspects_of(bounds, solver, state);
   const std::size_t newest = state.loops.size() - 1;
   const bool risen = !(newest_rise <= bound_of(newest));
   if (!risen && suspects.front().share <= 1.0) return std::nullopt;

@@ -14,8 +14,9 @@ namespace ignis {
 struct LoopEntry {
   bool entered = false;
   std::string refusal;
-  /// Rise of the chi-square of the graph. In a linear graph this is the squared Mahalanobis distance of the loop from
-  /// what the graph had predicted, with the covariance of both.
+  /// Rise of the chi-square of the graph, or a larger number that can be believed too. In a linear graph the rise is
+  /// the squared Mahalanobis distance of the loop from what the graph had predicted, with the covariance of both; with
+  /// the loop's own covariance alone it is larger.
   double rise = 0.0;
 };
 

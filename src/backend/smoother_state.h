@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unordered_map>
+#include <boost/unordered/unordered_flat_map.hpp>
 #include <vector>
 
 #include "backend/cloud_store.h"
@@ -59,7 +59,7 @@ struct SmootherState {
   // What follows from the above; brought up to date by follow_nodes().
   PlaceIndex places{kPlaceCell};
   OdometryChain odometry;
-  std::unordered_map<std::uint64_t, bool> agreement;  ///< of pairs of loop numbers that were compared
+  boost::unordered_flat_map<std::uint64_t, bool> agreement;  ///< of pairs of loop numbers that were compared
 
   static constexpr double kPlaceCell = 8.0;  // [m] about the radius of the candidate test
 

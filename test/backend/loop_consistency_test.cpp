@@ -28,7 +28,7 @@ LoopClaim claim(const OdometryChain& chain, std::size_t from, std::size_t to, do
   return loop;
 }
 
-constexpr ConsistencyRule kPlain{1.0, 0.999};
+const ConsistencyRule kPlain{1.0, ChiSquareBounds(0.999)};
 
 TEST(LoopConsistency, ComparesALoopWithTheDriftBetweenItsEnds) {
   const OdometryChain chain = straight(101, 0.05);  // 0.5 m and, by heading, 0.58 m after 100 steps
@@ -41,7 +41,7 @@ TEST(LoopConsistency, ComparesALoopWithTheDriftBetweenItsEnds) {
   EXPECT_FALSE(value(1.0, 90).passed()) << "ten steps do not drift so far";
   EXPECT_NEAR(value(2.0, 0).value, 4.0 * value(1.0, 0).value, 1e-6 * value(1.0, 0).value);
   EXPECT_NEAR(value(0.0, 0).bound, 22.458, 1e-3);
-  const ChiSquareTest wide = test_against_odometry(claim(chain, 100, 0, 1.0), chain, {2.0, 0.999});
+  const ChiSquareTest wide = test_against_odometry(claim(chain, 100, 0, 1.0), chain, {2.0, ChiSquareBounds(0.999)});
   EXPECT_NEAR(wide.value, 0.25 * value(1.0, 0).value, 1e-9);
 }
 
@@ -101,7 +101,7 @@ TEST(LoopConsistency, JudgesNeighboursMoreStrictlyThanOdometryCan) {
   EXPECT_TRUE(test_against_each_other(claim(chain, 100, 0, 0.05), right, chain, kPlain).passed());
   EXPECT_GT(open_distance(100, 0, chain, kPlain), 0.5);
   EXPECT_LT(open_distance(wrong, right, chain, kPlain), 0.2);
-  EXPECT_NEAR(open_distance(100, 0, chain, {2.0, 0.999}), 2.0 * open_distance(100, 0, chain, kPlain), 1e-9);
+  EXPECT_NEAR(open_distance(100, 0, chain, {2.0, ChiSquareBounds(0.999)}), 2.0 * open_distance(100, 0, chain, kPlain), 1e-9);
 }
 
 TEST(LoopConsistency, BelievesTheLargestSetWhoeverCameFirst) {
