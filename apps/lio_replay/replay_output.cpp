@@ -232,19 +232,20 @@ Json report(const runtime::Application& application, const ReplaySource& source,
                            {"half_chi_square_incremental", result.optimum.half_chi_square_before},
                            {"swapped_in", result.smoother.shadow_swaps > 0}};
   json["solver_rebuilds"] = result.smoother.solver_rebuilds;
-  json["voxels"] = {
-      {"local", pipeline.voxels().size(0)}, {"mid", pipeline.voxels().size(1)}, {"coarse", pipeline.voxels().size(2)}};
+  json["voxels"] = {{"local", pipeline.follower().voxels().size(0)},
+                    {"mid", pipeline.follower().voxels().size(1)},
+                    {"coarse", pipeline.follower().voxels().size(2)}};
   json["trajectory_hash"] = trajectory_hash(result);
-  json["map_hash"] = pipeline.voxels().fingerprint();
+  json["map_hash"] = pipeline.follower().voxels().fingerprint();
   json["timing"] = {{"wall_s", timing.wall_s},
                     {"real_time_factor", timing.wall_s > 0.0 ? seconds / timing.wall_s : 0.0},
                     {"scan_p50_ms", quantile(result.scan_times_ms, 0.5)},
                     {"scan_p99_ms", quantile(result.scan_times_ms, 0.99)},
                     {"scan_p50_ms_by_quarter", medians_by_quarter(result.scan_times_ms)},
                     {"frontend", timer_json(pipeline.frontend_timer())},
-                    {"backend", timer_json(pipeline.backend_timer())},
-                    {"batch_optimum", timer_json(pipeline.batch_timer())},
-                    {"map", timer_json(pipeline.map_timer())}};
+                    {"backend", timer_json(pipeline.follower().backend_timer())},
+                    {"batch_optimum", timer_json(pipeline.follower().batch_timer())},
+                    {"map", timer_json(pipeline.follower().map_timer())}};
   return json;
 }
 
@@ -349,8 +350,8 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const r
     write_tum(folder / "ground_truth.tum", sampled(source.input.ground_truth(), result.odometry));
   }
   write_pose_graph(folder / "keyframes.g2o", result.graph);
-  write_pcd(folder / "map.pcd", pipeline.voxels());
-  write_ply(folder / "map.ply", pipeline.voxels());
+  write_pcd(folder / "map.pcd", pipeline.follower().voxels());
+  write_ply(folder / "map.ply", pipeline.follower().voxels());
   write_scan_stats(folder / "scan_stats.csv", result);
   write_states(folder / "eskf_states.csv", result);
   write_loops(folder / "loops.csv", result);

@@ -6,139 +6,62 @@
 namespace ignis {
 namespace {
 
-/// There is no journal to look up clouds in, and a replay shall find the loops of the vehicle, which has one.
-constexpr double kCloudMemoryMb = 1e6;
-
-BackendConfig for_replay(BackendConfig config, bool use_loops) {
-  config.use_loop_closing = config.use_loop_closing && use_loops;
-  config.cloud_memory_mb = kCloudMemoryMb;
-  return config;
-}
+/// Scans that the front end may be ahead: a loop's search takes as long as a hundred scans of an L1, and 128 thinned
+/// scans of the largest LiDAR are some 40 MB.
+constexpr std::ptrdiff_t kMostAhead = 128;
 
 }  // namespace
 
 ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener)
-    : backend_config_(for_replay(config.backend, use_loops)),
-      loop_gates_(config.frontend.loop_gates),
-      lio_(config.frontend.filter),
-      smoother_(backend_config_, loop_gates_),
-      map_(config.map),
-      listener_(listener) {
-  map_.draw_at_rebuild();  // finish() does; nobody looks before
+    : lio_(config.frontend.filter), follower_(config, use_loops, listener) {
+  steps_.set_capacity(kMostAhead);
+  following_ = std::thread([this] { follow(); });
 }
 
+ReplayPipeline::~ReplayPipeline() { end_following(); }
+
 void ReplayPipeline::add_imu(const ImuSample& sample) {
-  const ImuResult imu = frontend_timer_.time([&] { return lio_.add_imu(sample); });
-  ++result_.imu_samples;
-  if (imu.fault != ImuFault::kNone) ++result_.rejected_imu[std::string(text(imu.fault))];
-  for (const ScanResult& scan : imu.scans) take(scan, frontend_timer_.newest_ms());
+  ImuResult imu = frontend_timer_.time([&] { return lio_.add_imu(sample); });
+  ++imu_samples_;
+  if (imu.fault != ImuFault::kNone) ++rejected_imu_[std::string(text(imu.fault))];
+  for (ScanResult& scan : imu.scans) hand_over(std::move(scan), frontend_timer_.newest_ms());
 }
 
 void ReplayPipeline::add_scan(Scan scan) {
-  const std::vector<ScanResult> scans = frontend_timer_.time([&] { return lio_.add_scan(std::move(scan)); });
-  for (const ScanResult& each : scans) take(each, frontend_timer_.newest_ms());
+  std::vector<ScanResult> scans = frontend_timer_.time([&] { return lio_.add_scan(std::move(scan)); });
+  for (ScanResult& each : scans) hand_over(std::move(each), frontend_timer_.newest_ms());
 }
 
-void ReplayPipeline::take(const ScanResult& scan, double milliseconds) {
-  result_.scans.push_back(scan.stats);
-  result_.scan_times_ms.push_back(milliseconds);
-  if (!scan.has_state) return;
-  follow_session(scan.stats.session);
-  result_.odometry.push_back({scan.state.utime, scan.state.T_odom_body});
-  result_.states.push_back({scan.state, scan.covariance});
-  if (scan.keyframe) take_keyframe(*scan.keyframe);
-  map_timer_.time([&] { return map_.insert_scan(scan.cloud, scan.state.T_odom_body); });
+void ReplayPipeline::hand_over(ScanResult scan, double milliseconds) {
+  steps_.push({std::move(scan), milliseconds, false});
 }
 
-void ReplayPipeline::follow_session(std::int32_t session) {
-  if (session == session_) return;
-  session_ = session;
-  ++result_.sessions;
-  settle_graph();
-  smoother_ = Smoother(backend_config_, loop_gates_);
-  schedule_ = {};
-  newest_keyframe_ = 0;
-  map_.clear();
-  keyframes_.clear();
-  result_.loops.clear();
-}
-
-void ReplayPipeline::take_keyframe(const Keyframe& sent) {
-  for (const keyframe_t& part : messages::to_messages(sent)) {
-    if (listener_ != nullptr) listener_->keyframe_sent(part);
-    const std::optional<Keyframe> keyframe = assembler_.add(part);
-    if (!keyframe) continue;
-    map_.add_keyframe(*keyframe);
-    adopt_due_optimum();
-    const SmootherUpdate update = backend_timer_.time([&] { return smoother_.add_keyframe(*keyframe); });
-    newest_keyframe_ = keyframe->state.utime;
-    keyframes_[keyframe->id] = {keyframe->state.utime, keyframe->state.T_odom_body, keyframe->state.T_odom_body};
-    if (update.loop) result_.loops.push_back(*update.loop);
-    result_.loops.insert(result_.loops.end(), update.changed.begin(), update.changed.end());
-    if (update.accepted()) publish(update);
+void ReplayPipeline::follow() {
+  Step step;
+  for (steps_.pop(step); !step.is_last; steps_.pop(step)) {
+    if (failure_) continue;  // the front end shall not wait for room for ever
+    try {
+      follower_.take(step.scan, step.milliseconds);
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
   }
 }
 
-void ReplayPipeline::adopt_due_optimum() {
-  if (!schedule_.adoption_due(smoother_.stats().keyframes)) return;
-  schedule_.end();
-  const int swaps = smoother_.stats().shadow_swaps;
-  const SmootherUpdate update = smoother_.adopt(batch_timer_.time([&] { return solve(problem_); }));
-  if (smoother_.stats().shadow_swaps != swaps) publish(update);
-}
-
-/// What the back end does with an update that it accepted.
-void ReplayPipeline::publish(const SmootherUpdate& update) {
-  if (listener_ != nullptr) listener_->graph_changed(smoother_, update, session_, newest_keyframe_);
-  correct_map(update);
-  schedule_.note(update);
-  if (!schedule_.begin_due()) return;
-  schedule_.begin(smoother_.stats().keyframes);
-  problem_ = smoother_.shadow_problem();
-}
-
-void ReplayPipeline::correct_map(const SmootherUpdate& update) {
-  if (update.loop && update.loop->accepted()) map_.add_loop(update.loop->from_id, update.loop->to_id);
-  for (const LoopResult& loop : update.changed) {
-    if (loop.accepted()) map_.add_loop(loop.from_id, loop.to_id);
-    if (loop.reason == LoopReason::kWithdrawn) map_.remove_loop(loop.from_id, loop.to_id);
-  }
-  std::vector<CorrectedPose> poses;
-  poses.reserve(update.moved.size());
-  for (const KeyframePose& pose : update.moved) poses.push_back({pose.id, pose.T_map_body});
-  map_.correct(update.T_map_odom, poses);
-}
-
-void ReplayPipeline::rebuild_map() {
-  map_timer_.time([&] {
-    const RebuildJob job = map_.begin_rebuild();
-    map_.finish_rebuild(rebuild(job));
-  });
-}
-
-/// Places the poses of this session where its graph has them in the end.
-void ReplayPipeline::settle_graph() {
-  result_.optimum = batch_timer_.time([&] { return solve(smoother_.shadow_problem()); });
-  correct_map(smoother_.adopt(result_.optimum));
-  std::vector<KeyframeCorrection> corrections;
-  for (const KeyframePose& pose : smoother_.all_poses()) {
-    KeyframeCorrection& keyframe = keyframes_.at(pose.id);
-    keyframe.T_map_body = pose.T_map_body;
-    corrections.push_back(keyframe);
-  }
-  const auto placed = static_cast<std::ptrdiff_t>(result_.smoothed.size());
-  const Trajectory session(result_.odometry.begin() + placed, result_.odometry.end());
-  const Trajectory smoothed = corrected_trajectory(session, corrections);
-  result_.smoothed.insert(result_.smoothed.end(), smoothed.begin(), smoothed.end());
+void ReplayPipeline::end_following() {
+  if (!following_.joinable()) return;
+  steps_.push({{}, 0.0, true});
+  following_.join();
 }
 
 ReplayResult ReplayPipeline::finish() {
-  settle_graph();
-  rebuild_map();
-  result_.graph = smoother_.pose_graph();
-  result_.smoother = smoother_.stats();
-  result_.start = lio_.status().text;
-  return std::move(result_);
+  end_following();
+  if (failure_) std::rethrow_exception(failure_);
+  ReplayResult result = follower_.finish();
+  result.start = lio_.status().text;
+  result.imu_samples = imu_samples_;
+  result.rejected_imu = std::move(rejected_imu_);
+  return result;
 }
 
 }  // namespace ignis

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "backend/shadow_optimum.h"
+#include "backend/smoother.h"
+#include "common/trajectory_file.h"
+#include "frontend/lio.h"
+
+namespace ignis {
+
+/// A state of the filter and its published covariance, order of ErrorBlock.
+struct UncertainState {
+  NavState state;
+  Matrix15d covariance;
+};
+
+/// Everything that a replay produces, before it becomes files.
+struct ReplayResult {
+  std::vector<ScanStats> scans;
+  std::vector<double> scan_times_ms;  ///< wall time of each scan in the front end
+  std::vector<LoopResult> loops;
+  Trajectory odometry;                 ///< one row per scan, frame odom
+  std::vector<UncertainState> states;  ///< on the same stamps
+  Trajectory smoothed;                 ///< on the same stamps, frame map of each session
+  PoseGraph graph;
+  SmootherStats smoother;
+  ShadowOptimum optimum;  ///< how far the incremental solution was from the batch optimum at the end
+  int sessions = 1;       ///< the front end's; all above but the trajectories is of the newest
+  std::string start;      ///< what the front end says about its start
+  std::int64_t imu_samples = 0;
+  std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
+};
+
+}  // namespace ignis
