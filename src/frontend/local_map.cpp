@@ -251,12 +251,18 @@ void LocalMap::prune(Block& block) {
   const Eigen::Array3d near = (corner - last_slide_).array();
   const Eigen::Array3d farthest = near.abs().max((near + edge).abs());
   if ((farthest <= window).all()) return;  // none of its voxels has to be read
+  const auto sure_since = static_cast<float>(sure_since_);
+  if (block.oldest >= sure_since && (farthest <= memory).all()) return;
+  block.oldest = static_cast<float>(scans_);
   for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {
     const int bit = std::countr_zero(left);
     const Voxel voxel = block.voxel(bit);
     const Eigen::Array3d offset = (corner + voxel.point.cast<double>() - last_slide_).cwiseAbs().array();
-    const bool sure = voxel.scan >= static_cast<float>(sure_since_);
-    if ((offset <= (sure ? memory : window)).all()) continue;
+    const bool sure = voxel.scan >= sure_since;
+    if ((offset <= (sure ? memory : window)).all()) {
+      block.oldest = std::min(block.oldest, voxel.scan);
+      continue;
+    }
     block.occupied &= ~(std::uint64_t{1} << bit);
     block.confirmed &= ~(std::uint64_t{1} << bit);
     --size_;

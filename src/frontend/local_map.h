@@ -95,6 +95,7 @@ class LocalMap {
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of block edges
     std::uint64_t occupied = 0;
     std::uint64_t confirmed = 0;
+    float oldest = 0.0F;  ///< no voxel has a smaller `scan`: these only grow
 
     [[nodiscard]] Eigen::Vector3f point(int bit) const;  ///< [m] relative to the block's corner
     [[nodiscard]] Voxel voxel(int bit) const;

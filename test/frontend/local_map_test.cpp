@@ -309,6 +309,22 @@ TEST(LocalMap, KeepsWhatIsSurelyPlacedBeyondTheWindow) {
   EXPECT_TRUE(map.empty());
 }
 
+TEST(LocalMap, ForgetsBeyondTheWindowWhatIsNoLongerSure) {
+  FrontendConfig config;
+  config.map_memory_m = 60.0;
+  LocalMap map(config);
+  map.slide(Eigen::Vector3d::Zero(), 0);
+  map.insert(std::vector<Eigen::Vector3f>{{0.1F, 0.1F, 0.1F}}, {}, true);
+  map.insert(std::vector<Eigen::Vector3f>{{0.5F, 0.1F, 0.1F}}, {}, true);
+  slide_at(map, {30.0, 0.0, 0.0}, 1);
+  EXPECT_EQ(map.size(), 2) << "both are sure";
+  slide_at(map, {36.0, 0.0, 0.0}, 1);
+  EXPECT_EQ(map.size(), 2);
+  slide_at(map, {42.0, 0.0, 0.0}, 2);
+  ASSERT_EQ(map.size(), 1) << "a neighbour within centimetres is younger, and stays";
+  EXPECT_NEAR(map.points()[0].x(), 0.5, 1e-6);
+}
+
 TEST(LocalMap, FindsAllThatIsLeftWhileItIsBeingSwept) {
   LocalMap map(FrontendConfig{});
   map.slide(Eigen::Vector3d::Zero(), 0);
