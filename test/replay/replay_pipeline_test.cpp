@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "frontend/lio_runner.h"
 
@@ -82,6 +83,26 @@ TEST(ReplayPipeline, TakesTheBatchOptimumOverWhereTheBackEndDoes) {
   EXPECT_EQ(published.changes, published.keyframes + static_cast<int>(published.swapped_at.size()));
   const auto first = std::ranges::find_if(result.loops, &LoopResult::accepted);
   EXPECT_EQ(published.swapped_at.front(), first->keyframes + shadow_delay(first->keyframes));
+}
+
+class FailingListener : public GraphListener {
+ public:
+  void keyframe_sent(const keyframe_t& part) override {
+    if (part.id == 1) throw std::runtime_error("the second keyframe");
+  }
+  void graph_changed(const Smoother& /*smoother*/, const SmootherUpdate& /*update*/, std::int32_t /*session*/,
+                     Utime /*utime*/) override {}
+};
+
+TEST(ReplayPipeline, ThrowsAtTheEndWhatTheOtherThreadThrew) {
+  FailingListener listener;
+  const test::Drive drive = hall_drive();
+  try {
+    static_cast<void>(replay(drive, {}, &listener));
+    FAIL() << "nothing was thrown";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "the second keyframe");
+  }
 }
 
 TEST(ReplayPipeline, HasOneSessionWhereTheMapHolds) {
