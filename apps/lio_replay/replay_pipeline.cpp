@@ -8,13 +8,12 @@ namespace {
 
 /// Scans that the front end may be ahead: a loop's search takes as long as a hundred scans of an L1, and 128 thinned
 /// scans of the largest LiDAR are some 40 MB.
-constexpr std::ptrdiff_t kMostAhead = 128;
+constexpr std::size_t kMostAhead = 128;
 
 }  // namespace
 
 ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener)
-    : lio_(config.frontend.filter), follower_(config, use_loops, listener) {
-  steps_.set_capacity(kMostAhead);
+    : lio_(config.frontend.filter), follower_(config, use_loops, listener), steps_(kMostAhead) {
   following_ = std::thread([this] { follow(); });
 }
 
@@ -37,8 +36,7 @@ void ReplayPipeline::hand_over(ScanResult scan, double milliseconds) {
 }
 
 void ReplayPipeline::follow() {
-  Step step;
-  for (steps_.pop(step); !step.is_last; steps_.pop(step)) {
+  for (Step step = steps_.pop(); !step.is_last; step = steps_.pop()) {
     if (failure_) continue;  // the front end shall not wait for room for ever
     try {
       follower_.take(step.scan, step.milliseconds);

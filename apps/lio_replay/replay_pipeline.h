@@ -4,8 +4,7 @@
 #include <exception>
 #include <thread>
 
-#include <oneapi/tbb/concurrent_queue.h>
-
+#include "bounded_queue.h"
 #include "frontend/lio.h"
 #include "replay_follower.h"
 
@@ -48,7 +47,7 @@ class ReplayPipeline {
   std::int64_t imu_samples_ = 0;
   std::map<std::string, std::int64_t> rejected_imu_;
   ReplayFollower follower_;
-  tbb::concurrent_bounded_queue<Step> steps_;
+  BoundedQueue<Step> steps_;
   std::exception_ptr failure_;  // of the other thread; behind it nothing is followed any more
   std::thread following_;
 };

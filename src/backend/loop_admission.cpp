@@ -168,7 +168,7 @@ void enter_believed(const Hearing& hearing, const BackendConfig& config, Increme
   // One that enters may support those that waited before it.
   for (auto next = std::ranges::find_if(state.waiting, deserves); next != state.waiting.end();
        next = std::ranges::find_if(state.waiting, deserves)) {
-    const GraphLoop copy = *next;
+    const GraphLoop copy = std::move(*next);
     state.waiting.erase(next);
     const LoopEntry entry = enter_graph(copy, config, solver, state);
     if (!entry.entered) {
