@@ -101,7 +101,8 @@ TEST(LoopConsistency, JudgesNeighboursMoreStrictlyThanOdometryCan) {
   EXPECT_TRUE(test_against_each_other(claim(chain, 100, 0, 0.05), right, chain, kPlain).passed());
   EXPECT_GT(open_distance(100, 0, chain, kPlain), 0.5);
   EXPECT_LT(open_distance(wrong, right, chain, kPlain), 0.2);
-  EXPECT_NEAR(open_distance(100, 0, chain, {2.0, ChiSquareBounds(0.999)}), 2.0 * open_distance(100, 0, chain, kPlain), 1e-9);
+  EXPECT_NEAR(open_distance(100, 0, chain, {2.0, ChiSquareBounds(0.999)}), 2.0 * open_distance(100, 0, chain, kPlain),
+              1e-9);
 }
 
 TEST(LoopConsistency, BelievesTheLargestSetWhoeverCameFirst) {
