@@ -68,17 +68,18 @@ class Viewer(threading.Thread):
         status, self.socket = server.upgrade()
         assert status == 101
         self.frames = self.bytes = 0
-        self.longest_pause = 0.0
+        self.longest_pause = self.longest_pause_began = 0.0
         self.start()
 
     def run(self) -> None:
-        last = time.monotonic()
+        began = last = time.monotonic()
         try:
             while True:
                 opcode, payload = self.socket.receive()
                 if opcode == 2:
                     now = time.monotonic()
-                    self.longest_pause = max(self.longest_pause, now - last)
+                    if now - last > self.longest_pause:
+                        self.longest_pause, self.longest_pause_began = now - last, last - began
                     last, self.frames, self.bytes = now, self.frames + 1, self.bytes + len(payload)
         except OSError:
             return
@@ -173,7 +174,12 @@ def drive(folder: Path, seconds: float, viewers: int, speed: float) -> tuple[lis
         "journal_mb": round(journal / 1e6, 2),
         "messages_lost": lost,
         "viewers": [
-            {"frames": each.frames, "mb": round(each.bytes / 1e6, 1), "longest_pause_s": round(each.longest_pause, 2)}
+            {
+                "frames": each.frames,
+                "mb": round(each.bytes / 1e6, 1),
+                "longest_pause_s": round(each.longest_pause, 2),
+                "it_began_at_s": round(each.longest_pause_began, 1),
+            }
             for each in watching
         ],
     }
