@@ -9,6 +9,9 @@ namespace {
 
 // Below this angle the closed forms lose digits to cancellation and their Taylor series is exact to double precision.
 constexpr double kSmallAngle = 1e-4;
+// rad^2. Below, what one inertial sample turns by, five terms of a series are exact to double precision: the sixth is
+// below 1e-17. They cost a fifth of the sines, and lose nothing to cancellation.
+constexpr double kFewTerms2 = 0.01;
 
 }  // namespace
 
@@ -19,10 +22,15 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
 }
 
 Eigen::Quaterniond exp(const Eigen::Vector3d& phi) {
-  const double angle = phi.norm();
+  const double angle2 = phi.squaredNorm();
+  if (angle2 < kFewTerms2) {
+    const double h2 = 0.25 * angle2;
+    const Eigen::Vector3d imaginary = 0.5 * series<6, 20, 42, 72>(h2) * phi;
+    return {series<2, 12, 30, 56>(h2), imaginary.x(), imaginary.y(), imaginary.z()};
+  }
+  const double angle = std::sqrt(angle2);
   const double half = 0.5 * angle;
-  const double scale = angle < kSmallAngle ? 0.5 - angle * angle / 48.0 : std::sin(half) / angle;
-  const Eigen::Vector3d imaginary = scale * phi;
+  const Eigen::Vector3d imaginary = std::sin(half) / angle * phi;
   return Eigen::Quaterniond(std::cos(half), imaginary.x(), imaginary.y(), imaginary.z()).normalized();
 }
 
@@ -39,14 +47,16 @@ Eigen::Vector3d log(const Eigen::Quaterniond& q) {
 }
 
 Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& phi) {
-  const double angle = phi.norm();
+  const double angle2 = phi.squaredNorm();
   const Eigen::Matrix3d S = skew(phi);
-  const double angle2 = angle * angle;
-  if (angle < kSmallAngle) {
-    return Eigen::Matrix3d::Identity() - (0.5 - angle2 / 24.0) * S + (1.0 / 6.0 - angle2 / 120.0) * S * S;
+  const Eigen::Matrix3d S2 = phi * phi.transpose() - angle2 * Eigen::Matrix3d::Identity();
+  if (angle2 < kFewTerms2) {
+    return Eigen::Matrix3d::Identity() - (1.0 / 2.0) * series<12, 30, 56, 90>(angle2) * S +
+           (1.0 / 6.0) * series<20, 42, 72, 110>(angle2) * S2;
   }
+  const double angle = std::sqrt(angle2);
   return Eigen::Matrix3d::Identity() - ((1.0 - std::cos(angle)) / angle2) * S +
-         ((angle - std::sin(angle)) / (angle2 * angle)) * S * S;
+         ((angle - std::sin(angle)) / (angle2 * angle)) * S2;
 }
 
 Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& phi) {

@@ -14,12 +14,20 @@ namespace ignis::so3 {
 /// Rotation of |phi| radians about phi. Exact for small angles too.
 [[nodiscard]] Eigen::Quaterniond exp(const Eigen::Vector3d& phi);
 
+/// 1 - x/a (1 - x/b (1 - ...)) with a, b, ... the divisors, as the series of sines and cosines are best added up:
+/// without a division, each of which the next would wait for.
+template <int kFirst, int... kRest>
+[[nodiscard]] constexpr double series(double x) {
+  if constexpr (sizeof...(kRest) > 0) return 1.0 - x * (1.0 / kFirst) * series<kRest...>(x);
+  return 1.0 - x * (1.0 / kFirst);
+}
+
 /// exp(phi) * point without a quaternion or a call of sin: Rodrigues' formula with its two coefficients as series. For
 /// |phi| up to 0.5 the error is below 1e-10 of the point; beyond, use exp.
 [[nodiscard]] inline Eigen::Vector3d rotate_a_little(const Eigen::Vector3d& phi, const Eigen::Vector3d& point) {
   const double a2 = phi.squaredNorm();
-  const double sine = 1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0)));
-  const double cosine = 0.5 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0 * (1.0 - a2 / 90.0))));
+  const double sine = series<6, 20, 42, 72>(a2);
+  const double cosine = 0.5 * series<12, 30, 56, 90>(a2);
   const Eigen::Vector3d turned = phi.cross(point);
   return point + sine * turned + cosine * phi.cross(turned);
 }

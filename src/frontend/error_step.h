@@ -25,6 +25,7 @@ class ErrorStep {
   static constexpr int kPaddedMoving = 10;
 
   ErrorCovariance F_;
+  double dt_;                                            ///< [s]
   Eigen::Matrix<double, kMoving, kMoving> white_noise_;  ///< of the samples
   double gyro_bias_variance_;                            ///< that the walks of the biases add
   double accel_bias_variance_;

@@ -9,9 +9,9 @@ namespace {
 
 using Block = Eigen::Matrix3d;
 
-Eigen::Vector3d acceleration_odom(const NavState& state, const InertialInput& input, double dt, double gravity) {
-  const Eigen::Vector3d rate = input.gyro - state.gyro_bias;
-  const Eigen::Quaterniond q_mid = state.T_odom_body.rotation * so3::exp(0.5 * dt * rate);
+/// Acceleration in odom axes, at the attitude in the middle of a step.
+Eigen::Vector3d acceleration_odom(const NavState& state, const Eigen::Quaterniond& q_mid, const InertialInput& input,
+                                  double gravity) {
   return q_mid * (input.accel - state.accel_bias) + gravity * state.gravity_direction();
 }
 
@@ -56,10 +56,12 @@ ErrorVector difference(const NavState& from, const NavState& to) {
 }
 
 NavState predict_nominal(const NavState& state, const InertialInput& input, double dt, double gravity) {
-  const Eigen::Vector3d acceleration = acceleration_odom(state, input, dt, gravity);
   NavState next = state;
   next.angular_rate = input.gyro - state.gyro_bias;
-  next.T_odom_body.rotation = (state.T_odom_body.rotation * so3::exp(dt * next.angular_rate)).normalized();
+  const Eigen::Quaterniond half_turn = so3::exp(0.5 * dt * next.angular_rate);
+  const Eigen::Quaterniond q_mid = state.T_odom_body.rotation * half_turn;
+  const Eigen::Vector3d acceleration = acceleration_odom(state, q_mid, input, gravity);
+  next.T_odom_body.rotation = (q_mid * half_turn).normalized();
   next.T_odom_body.translation += dt * state.v_odom + 0.5 * dt * dt * acceleration;
   next.v_odom += dt * acceleration;
   return next;
@@ -68,8 +70,10 @@ NavState predict_nominal(const NavState& state, const InertialInput& input, doub
 NavState predict_backward(const NavState& state, const InertialInput& input, double dt, double gravity) {
   NavState before = state;
   before.angular_rate = input.gyro - state.gyro_bias;
-  before.T_odom_body.rotation = (state.T_odom_body.rotation * so3::exp(-dt * before.angular_rate)).normalized();
-  const Eigen::Vector3d acceleration = acceleration_odom(before, input, dt, gravity);
+  const Eigen::Quaterniond half_turn = so3::exp(-0.5 * dt * before.angular_rate);
+  const Eigen::Quaterniond q_mid = state.T_odom_body.rotation * half_turn;
+  const Eigen::Vector3d acceleration = acceleration_odom(before, q_mid, input, gravity);
+  before.T_odom_body.rotation = (q_mid * half_turn).normalized();
   before.v_odom -= dt * acceleration;
   before.T_odom_body.translation -= dt * before.v_odom + 0.5 * dt * dt * acceleration;
   return before;
@@ -94,7 +98,7 @@ ErrorCovariance transition(const NavState& state, const InertialInput& input, do
   const Block accel_by_gyro_bias = 0.5 * dt * R_mid * so3::skew(force) * so3::right_jacobian(0.5 * phi);
 
   ErrorCovariance F = ErrorCovariance::Identity();
-  F.block<3, 3>(kAttitude, kAttitude) = so3::exp(-phi).toRotationMatrix();
+  F.block<3, 3>(kAttitude, kAttitude) = (half_turn * half_turn).transpose();
   F.block<3, 3>(kAttitude, kGyroBias) = -dt * so3::right_jacobian(phi);
   F.block<3, 3>(kPosition, kVelocity) = dt * Block::Identity();
   F.block<3, 3>(kPosition, kAttitude) = 0.5 * dt * dt * accel_by_attitude;

@@ -10,12 +10,15 @@ namespace ignis {
 namespace {
 
 // Closed forms against Eigen's general matrix functions: exact to rounding.
-constexpr double kRounding = 1e-12;
+constexpr double kRounding = 1e-14;
 
 std::vector<Eigen::Vector3d> rotation_vectors() {
-  std::vector<Eigen::Vector3d> vectors = {
-      Eigen::Vector3d::Zero(),        {1e-9, 0, 0},     {0, -1e-5, 1e-5}, {9.9e-5, 0, 0}, {1.1e-4, 0, 0}, {0, 3.1, 0},
-      {1.5707963267948966, 0.0, 0.0}, {-0.3, 0.2, -0.9}};
+  std::vector<Eigen::Vector3d> vectors = {Eigen::Vector3d::Zero(), {1e-9, 0, 0},
+                                          {0, -1e-5, 1e-5},        {9.9e-5, 0, 0},
+                                          {1.1e-4, 0, 0},          {0, 3.1, 0},
+                                          {0.0, 0.004, 0.001},     {0.0999, 0, 0},
+                                          {0, 0, 0.1001},          {1.5707963267948966, 0.0, 0.0},
+                                          {-0.3, 0.2, -0.9}};
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(-1.7, 1.7);
   for (int i = 0; i < 50; ++i) vectors.emplace_back(uniform(random), uniform(random), uniform(random));
