@@ -83,7 +83,11 @@ LocalMap::Region& LocalMap::find_or_add_region(const Eigen::Vector3i& coordinate
 std::int32_t LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) {
   const Eigen::Vector3i parent = cube_of(coordinate);
   const int bit = bit_of(coordinate - kEdge * parent);
-  Region& region = find_or_add_region(parent);
+  // A scan stays in a region for some blocks before it goes on to the next.
+  if (newest_region_ >= regions_.size() || regions_[newest_region_].coordinate != parent) {
+    newest_region_ = static_cast<std::size_t>(&find_or_add_region(parent) - regions_.data());
+  }
+  Region& region = regions_[newest_region_];
   if ((region.present >> bit & 1U) == 0) {
     region.present |= std::uint64_t{1} << bit;
     region.blocks[bit] = static_cast<std::int32_t>(blocks_.size());
@@ -192,7 +196,7 @@ NeighbourMoments LocalMap::gather(const Eigen::Vector3d& query, double radius, c
     const Eigen::Vector3f local = relative_to(block, query);
     for_each_row(block, box, [&](const Row& row, std::uint32_t lanes) { sums.add(row, lanes, local); });
   });
-  return sums.moments();
+  return RowSums<Sides::kOne>::moments({sums}).of(0);
 }
 
 std::optional<Eigen::Vector3d> LocalMap::nearest(const Eigen::Vector3d& query, double radius) const {

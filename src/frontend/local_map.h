@@ -160,6 +160,7 @@ class LocalMap {
   float average_points_;
   std::vector<Block> blocks_;
   std::vector<Region> regions_;
+  std::size_t newest_region_ = 0;    ///< index into regions_ of the one that was asked for last
   std::vector<std::int32_t> table_;  ///< index into regions_, -1 when free; power of two, at most half full
   int size_ = 0;
   int scans_ = 0;

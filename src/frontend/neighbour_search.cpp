@@ -8,15 +8,19 @@
 
 namespace ignis {
 
-std::span<const NeighbourMoments> NeighbourSearch::gather(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
-                                                          double radius, std::span<const Eigen::Vector3d> sides) {
+std::span<const FourMoments> NeighbourSearch::gather(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
+                                                     double radius, std::span<const Eigen::Vector3d> sides) {
   moments_.clear();
   for (; !queries.empty(); queries = queries.subspan(std::min(kTogether, queries.size()))) {
     const std::span<const Eigen::Vector3d> together = queries.first(std::min(kTogether, queries.size()));
     find_blocks(map, together, radius);
     find_rows(map, together);
-    add_rows(together.size(), radius, sides);
-    sides = sides.subspan(std::min(together.size(), sides.size()));
+    if (sides.empty()) {
+      add_rows<Sides::kAny>(together.size(), radius, sides);
+    } else {
+      add_rows<Sides::kOne>(together.size(), radius, sides);
+      sides = sides.subspan(together.size());
+    }
   }
   return moments_;
 }
@@ -33,31 +37,32 @@ void NeighbourSearch::find_blocks(const LocalMap& map, std::span<const Eigen::Ve
 }
 
 void NeighbourSearch::find_rows(const LocalMap& map, std::span<const Eigen::Vector3d> queries) {
-  rows_.clear();
+  std::size_t found = 0;
   row_ends_.fill(0);
   for (const auto& [block, query] : blocks_) {
+    if (rows_.size() < found + kRowsOfBlock) rows_.resize(2 * (found + kRowsOfBlock));
     const Eigen::Vector3f local = map.relative_to(*block, queries[query]);
     LocalMap::for_each_row(*block, boxes_[query], [&](const LocalMap::Row& row, std::uint32_t lanes) {
       __builtin_prefetch(&row.x);
       __builtin_prefetch(&row.scan);
-      rows_.push_back({&row, lanes, local});
+      rows_[found++] = {&row, lanes, local};
     });
-    row_ends_[query] = rows_.size();
+    row_ends_[query] = found;
   }
 }
 
+template <Sides kSides>
 void NeighbourSearch::add_rows(std::size_t queries, double radius, std::span<const Eigen::Vector3d> sides) {
   std::size_t next = 0;
-  const auto add = [&](std::size_t query, auto sums) {
-    for (; next < row_ends_[query]; ++next) sums.add(*rows_[next].row, rows_[next].lanes, rows_[next].query);
-    moments_.push_back(sums.moments());
-  };
-  for (std::size_t i = 0; i < queries; ++i) {
-    if (sides.empty()) {
-      add(i, RowSums<Sides::kAny>(radius));
-    } else {
-      add(i, RowSums<Sides::kOne>(radius, sides[i].cast<float>()));
+  for (std::size_t first = 0; first < queries; first += kLanes) {
+    std::array<RowSums<kSides>, kLanes> four;
+    for (std::size_t i = first; i < std::min(first + kLanes, queries); ++i) {
+      RowSums<kSides> sums(radius);
+      if constexpr (kSides == Sides::kOne) sums = RowSums<kSides>(radius, sides[i].template cast<float>());
+      for (; next < row_ends_[i]; ++next) sums.add(*rows_[next].row, rows_[next].lanes, rows_[next].query);
+      four[i - first] = sums;
     }
+    moments_.push_back(RowSums<kSides>::moments(four));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "frontend/local_map.h"
+#include "frontend/row_sums.h"
 
 namespace ignis {
 
@@ -14,13 +15,15 @@ namespace ignis {
 /// they all need is asked for before the first of them is worked on. Keeps its memory from scan to scan.
 class NeighbourSearch {
  public:
-  /// One for each query, the same to the bit as by LocalMap::gather; valid until the next call. `sides`: one for each
-  /// query, or none at all.
-  [[nodiscard]] std::span<const NeighbourMoments> gather(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
-                                                         double radius, std::span<const Eigen::Vector3d> sides = {});
+  /// One lane for each query, four by four, the same to the bit as by LocalMap::gather; lanes beyond the last query
+  /// have count 0. Valid until the next call. `sides`: one for each query, or none at all.
+  [[nodiscard]] std::span<const FourMoments> gather(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
+                                                    double radius, std::span<const Eigen::Vector3d> sides = {});
 
  private:
-  static constexpr std::size_t kTogether = 16;
+  static constexpr std::size_t kTogether = 16;  // a whole number of kLanes
+
+  static constexpr std::size_t kRowsOfBlock = LocalMap::kCells / LocalMap::kEdge;
 
   struct BlockVisit {
     const LocalMap::Block* block;
@@ -34,13 +37,14 @@ class NeighbourSearch {
 
   void find_blocks(const LocalMap& map, std::span<const Eigen::Vector3d> queries, double radius);
   void find_rows(const LocalMap& map, std::span<const Eigen::Vector3d> queries);
+  template <Sides kSides>
   void add_rows(std::size_t queries, double radius, std::span<const Eigen::Vector3d> sides);
 
   std::array<LocalMap::Box, kTogether> boxes_;
   std::array<std::size_t, kTogether> row_ends_;  ///< [query] end of its rows in rows_
   std::vector<BlockVisit> blocks_;
-  std::vector<RowVisit> rows_;
-  std::vector<NeighbourMoments> moments_;
+  std::vector<RowVisit> rows_;  ///< and room for more
+  std::vector<FourMoments> moments_;
 };
 
 }  // namespace ignis

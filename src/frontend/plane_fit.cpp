@@ -46,7 +46,8 @@ bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view)
   constexpr double kFlat = 0.1;  // rad
   const double now = plane.normal.dot(view);
   const double then = plane.normal.dot(plane.view);
-  return std::abs(now) > kFlat && std::abs(then) > kFlat && (now > 0.0) != (then > 0.0);
+  if ((now > 0.0) == (then > 0.0)) return false;
+  return std::abs(then) > kFlat && now * now > kFlat * kFlat * view.squaredNorm();
 }
 
 }  // namespace ignis

@@ -64,8 +64,9 @@ struct PlaneFit {
   return fit_plane(moments, config, config.match_radius_m);
 }
 
-/// True when the neighbours were seen from one side of their plane and `view`, a unit vector to the body, is on the
-/// other: they are the far face of a wall. Seen at a flat angle, errors of the normal decide, so that says nothing.
+/// True when the neighbours were seen from one side of their plane and `view`, a vector of any length to the body, is
+/// on the other: they are the far face of a wall. Seen at a flat angle, errors of the normal decide, so that says
+/// nothing.
 [[nodiscard]] bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view);
 
 }  // namespace ignis

@@ -8,6 +8,7 @@
 
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
+#include "frontend/plane_fits.h"
 #include "frontend/square_sum.h"
 
 namespace ignis {
@@ -149,7 +150,7 @@ void ScanMatcher::leave_out_new_surfaces(int newest_scan) {
 }
 
 void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from) {
-  planes_.assign(queries_.size(), {});
+  planes_.resize(queries_.size());
   chosen_.clear();
   for (std::size_t i = 0; i < queries_.size(); ++i) chosen_.push_back(i);
   fit_chosen(map, seen_from, config_, config_.match_radius_m);
@@ -170,13 +171,19 @@ void ScanMatcher::fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_fr
   const auto fit = [&](std::span<const Eigen::Vector3d> sides) {
     chosen_queries_.clear();
     for (const std::size_t i : chosen_) chosen_queries_.push_back(queries_[i]);
-    const std::span<const NeighbourMoments> moments = search_.gather(map, chosen_queries_, radius, sides);
-    for (std::size_t k = 0; k < chosen_.size(); ++k) planes_[chosen_[k]] = fit_plane(moments[k], config, radius);
+    chosen_planes_.clear();
+    for (const std::size_t i : chosen_) chosen_planes_.push_back(&planes_[i]);
+    std::span<PlaneFit* const> left = chosen_planes_;
+    for (const FourMoments& moments : search_.gather(map, chosen_queries_, radius, sides)) {
+      const auto four = left.first(std::min<std::size_t>(kLanes, left.size()));
+      fit_planes(moments, config, radius, four);
+      left = left.subspan(four.size());
+    }
   };
   fit({});
   sides_.clear();
   std::erase_if(chosen_, [&](std::size_t i) {
-    const Eigen::Vector3d view = (seen_from - queries_[i]).normalized();
+    const Eigen::Vector3d view = seen_from - queries_[i];
     const bool other = is_seen_from_other_side(planes_[i], view);
     if (other) sides_.push_back(planes_[i].normal.dot(view) > 0.0 ? planes_[i].normal : -planes_[i].normal);
     return !other;
@@ -260,16 +267,22 @@ double ScanMatcher::point_variance(const Pose& pose) const {
 PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_covariance, auto counts) const {
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   const double gate2 = config_.max_innovation_sigma * config_.max_innovation_sigma;
-  const double base_variance = map_noise_ * point_variance(pose);
+  const double base_information = 1.0 / (map_noise_ * point_variance(pose));
+  SquareSum information;
   PoseInformation sum;
   for (const Constraint& constraint : constraints_) {
     if (!counts(constraint)) continue;
     const Vector6d h = jacobian(R, constraint.point_body, constraint.plane.normal);
     const double z = residual(R, pose.translation, constraint);
-    const double variance = base_variance / constraint.weight;
-    if (z * z > gate2 * (h.dot(pose_covariance * h) + variance)) continue;
-    sum.add(h, z, variance);
+    const double weight = base_information * constraint.weight;
+    // Most lie within the point's own noise already; what the pose adds to it need not be known then.
+    const double sigmas2 = weight * z * z;
+    if (sigmas2 > gate2 && sigmas2 > gate2 * (weight * h.dot(pose_covariance * h) + 1.0)) continue;
+    information.add(h, weight);
+    sum.gradient += weight * z * h;
+    ++sum.count;
   }
+  sum.information = information.matrix();
   return sum;
 }
 

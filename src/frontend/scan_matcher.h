@@ -112,7 +112,8 @@ class ScanMatcher {
   std::vector<PlaneFit> planes_;          ///< [query]
   std::vector<std::size_t> chosen_;       ///< those of queries_ that planes are sought for
   std::vector<Eigen::Vector3d> chosen_queries_;
-  std::vector<Eigen::Vector3d> sides_;  ///< normals that point to the side that they are seen from
+  std::vector<PlaneFit*> chosen_planes_;  ///< those of planes_ that go with them
+  std::vector<Eigen::Vector3d> sides_;    ///< normals that point to the side that they are seen from
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;

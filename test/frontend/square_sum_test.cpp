@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 namespace ignis {
@@ -19,6 +20,20 @@ TEST(SquareSum, IsToTheBitTheSumOfTheWholeProducts) {
     whole += h * h.transpose();
   }
   EXPECT_EQ(sum.matrix(), whole);
+}
+
+TEST(SquareSum, CountsEachByItsWeight) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  SquareSum sum;
+  Matrix6d whole = Matrix6d::Zero();
+  for (int i = 0; i < 1000; ++i) {
+    const Vector6d h = Vector6d::NullaryExpr([&] { return normal(random); });
+    const double weight = std::abs(normal(random));
+    sum.add(h, weight);
+    whole += weight * h * h.transpose();
+  }
+  EXPECT_LT((sum.matrix() - whole).norm(), 1e-12 * whole.norm());
 }
 
 }  // namespace
