@@ -49,9 +49,6 @@ LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud) 
   number_ = written_ = newest.number;
   journal_->resume(loaded.head);
   session_ = loaded.head.session;
-  for (const MapRecord& record : loaded.records) {
-    if (record.is_keyframe) restored_[record.id] = record.utime;
-  }
   restore(map_, std::move(loaded.records));
   note_drops();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
@@ -64,7 +61,6 @@ LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud) 
 void LastingMap::begin_session(std::int32_t session) {
   map_.clear();
   loaded_.reset();
-  restored_.clear();
   session_.reset();  // the journal of this session may be that of another drive
   begin_journal(session);
 }
@@ -95,16 +91,6 @@ bool LastingMap::add_keyframe(const Keyframe& keyframe) {
 void LastingMap::write(MapRecord record) {
   record.number = written_ = number_;
   journal_->append(record);
-}
-
-bool LastingMap::is_of_another_drive(const Keyframe& keyframe) {
-  const auto same = restored_.find(keyframe.id);
-  const auto previous = restored_.find(keyframe.id - 1);
-  if (same == restored_.end() && previous == restored_.end()) return false;
-  const bool fits =
-      same != restored_.end() ? same->second == keyframe.state.utime : previous->second == keyframe.previous_utime;
-  restored_.clear();
-  return !fits;
 }
 
 void LastingMap::note_drops() {

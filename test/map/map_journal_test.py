@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from ignis.pipeline import binary
-from map_drive import URL, Drive
+from map_drive import URL, Drive, forged_message
 from stream_server import Server
 
 STEPS = 130
@@ -159,6 +159,17 @@ def test_fault_m4_a_damaged_journal_gives_what_is_whole_and_says_so(make_map) ->
     assert not (run.folder / "journal" / "map_keyframe_77").exists()
     _, said = run.end()
     assert "not whole: map_keyframe_" in said
+
+
+def test_a_forged_message_before_the_first_scan_costs_no_journal(make_map) -> None:
+    run = make_map()
+    run.drive_to(60)
+    run.kill()
+    run.start()
+    run.drive.bus.publish(*forged_message("SMOOTHED_KEYFRAMES"))
+    run.wait_for(lambda status: status.get("health") == "OK")
+    run.drive_to(61)
+    assert "goes on with" in run.end()[1]
 
 
 def test_a_journal_of_another_drive_is_not_gone_on_with(make_map) -> None:
