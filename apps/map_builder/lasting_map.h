@@ -28,9 +28,9 @@ class LastingMap {
   [[nodiscard]] bool waits_for_scan() const { return loaded_.has_value(); }
 
   struct Beginning {
-    std::string note;  ///< what became of the journal, for people; empty when none waited
-    std::optional<std::int32_t>
-        newest{};  ///< running number of the map's newest cloud, when the journal is gone on with
+    std::string note;                      ///< what became of the journal, for people; empty when none waited
+    std::optional<std::int32_t> newest{};  ///< number of the map's newest cloud, when the journal is gone on with
+    std::string damage{};                  ///< what of the journal is lost
   };
 
   /// Goes on with the journal that waits, or begins a new one.
@@ -43,7 +43,7 @@ class LastingMap {
   bool add_keyframe(const Keyframe& keyframe);
 
   /// Why the map is not in the journal; empty while all is well, and without a journal.
-  [[nodiscard]] std::string failure() const { return journal_ ? journal_->failure() : ""; }
+  [[nodiscard]] std::string failure() const { return journal_ ? journal_->failure() : std::string(); }
 
  private:
   void begin_journal(std::int32_t session);
@@ -54,6 +54,7 @@ class LastingMap {
   LiveMap map_;
   std::unique_ptr<MapJournal> journal_;
   std::optional<MapJournal::Loaded> loaded_;
+  std::string damage_;                   ///< of the journal, until the first scan
   std::optional<std::int32_t> session_;  ///< of the journal that is being written
   std::int64_t dropped_ = 0;
   std::int32_t number_ = 0;   ///< of the newest cloud

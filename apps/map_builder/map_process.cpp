@@ -120,6 +120,8 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
   if (const LastingMap::Beginning beginning = lasting_.begin_with(cloud); !beginning.note.empty()) {
     std::cerr << "map_builder: " << beginning.note << std::endl;
     keyframes_changed_ = true;
+    journal_damage_ = beginning.damage;
+    journal_damage_s_ = now_s();
     if (beginning.newest) missed_.begin(*beginning.newest, cloud.sequence, now_s());
   }
   if (missed_.waiting()) {
@@ -311,6 +313,7 @@ std::string MapProcess::trouble() {
   if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
   if (std::string failure = lasting_.failure(); !failure.empty()) return failure;
   if (std::string missing = missed_.trouble(now_s()); !missing.empty()) return missing;
+  if (!journal_damage_.empty() && now_s() - journal_damage_s_ < MissedScans::kTold_s) return journal_damage_;
   if (session_trouble) {
     return std::format("{} messages of another session than {} refused", of_other_sessions_, session_.value_or(0));
   }

@@ -103,6 +103,8 @@ class MapProcess {
   std::map<double, PictureBuilder> builders_;  // by view radius [m], as are the pictures
   std::map<double, SharedPicture> pictures_;
   std::int64_t picture_number_ = 0;
+  std::string journal_damage_;
+  double journal_damage_s_ = 0.0;  // when it was found
   std::int64_t refused_clouds_ = 0;
   std::int64_t refused_messages_ = 0;   // with a pose that no map can hold
   std::int64_t of_other_sessions_ = 0;  // refused as well
