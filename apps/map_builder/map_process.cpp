@@ -134,7 +134,7 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
 
 void MapProcess::on_cloud_again(const messages::PosedCloud& cloud) {
   if (!missed_.waiting() || cloud.session != session_ || !usable(cloud.T_odom_body)) return;
-  missed_.hold(cloud, now_s());
+  missed_.hold_again(cloud, now_s());
   catch_up();
 }
 
