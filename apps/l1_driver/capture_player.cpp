@@ -55,12 +55,16 @@ ExitCode play_capture(const Application& application, const std::string& path) {
   publish_all(decoder.finish());
 
   const l1::DecoderCounters counters = decoder.counters();
-  std::cout << std::format("l1_driver: {}: {} scans, {} inertial samples, {} checksum errors, {} packets missing\n",
-                           path, counters.scans_published, counters.imu_published, counters.framing.crc_errors,
-                           counters.scan_gaps);
-  if (counters.framing.frames > 0) return kDone;
-  throw UserError(std::format("{} holds no frame of an L1: is it a raw byte stream of the sensor?", path),
-                  kInputDamaged);
+  std::cout << std::format("l1_driver: {}: {} scans, {} inertial samples\n", path, counters.scans_published,
+                           counters.imu_published);
+  if (counters.framing.frames == 0) {
+    throw UserError(std::format("{} holds no frame of an L1: is it a raw byte stream of the sensor?", path),
+                    kInputDamaged);
+  }
+  const std::string damage = l1::damage_in(counters);
+  if (damage.empty()) return kDone;
+  std::cerr << "l1_driver: " << damage << std::endl;
+  return kInputDamaged;
 }
 
 }  // namespace ignis::runtime

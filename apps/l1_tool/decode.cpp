@@ -81,20 +81,6 @@ DriverConfig without_filters(DriverConfig config) {
   return config;
 }
 
-void print_damage(const l1::StreamCounters& counters) {
-  std::cerr << std::format(
-      "l1_tool: damage in the stream: {} checksum errors, {} bytes outside frames, {} pairs and {} inertial samples "
-      "missing, {} halves without partner, {} repeats, {} frames with impossible values\n",
-      counters.framing.crc_errors, counters.framing.skipped_bytes, counters.scan_gaps, counters.imu_gaps,
-      counters.pairing.unpaired, counters.duplicates, counters.rejected_values);
-}
-
-bool is_damaged(const l1::StreamCounters& counters) {
-  return counters.framing.crc_errors + counters.framing.skipped_bytes + counters.scan_gaps + counters.imu_gaps +
-             counters.duplicates + counters.rejected_values >
-         0;
-}
-
 }  // namespace
 
 runtime::ExitCode decode_capture(const DecodeFiles& files, const DriverConfig& config) {
@@ -121,8 +107,9 @@ runtime::ExitCode decode_capture(const DecodeFiles& files, const DriverConfig& c
   tables.commit();
   std::cout << std::format("{}: {} pairs with {} points, {} inertial samples\n", files.capture.string(), tables.pairs(),
                            tables.points(), tables.samples());
-  if (!is_damaged(counters)) return runtime::kDone;
-  print_damage(counters);
+  const std::string damage = l1::damage_in(counters);
+  if (damage.empty()) return runtime::kDone;
+  std::cerr << "l1_tool: " << damage << '\n';
   return runtime::kInputDamaged;
 }
 

@@ -14,6 +14,7 @@
 #include "graph_agreement.h"
 #include "replay_output.h"
 #include "replay_progress.h"
+#include "replay_verdict.h"
 #include "runtime/stop_signal.h"
 
 namespace {
@@ -101,11 +102,7 @@ runtime::ExitCode replay(const runtime::Application& application, const Options&
                             graph.agreement(result.scans.empty() ? first : result.scans.back().utime)};
   write_results(options.folder, application, source, pipeline, result, timing);
   std::cout << summary(source, result, timing) << std::format("results:    {}\n", options.folder);
-  if (result.odometry.empty()) {
-    throw runtime::UserError(std::format("no pose was computed: {}", result.start), runtime::kFailed);
-  }
-  if (runtime::stop_requested()) return runtime::kFailed;
-  return input->inventory().damaged() ? runtime::kInputDamaged : runtime::kDone;
+  return verdict(result, input->inventory(), runtime::stop_requested());
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "replay_follower.h"
 
+#include <format>
 #include <utility>
 
 namespace ignis {
@@ -62,8 +63,17 @@ void ReplayFollower::take_keyframe(const Keyframe& sent) {
     keyframes_[keyframe->id] = {keyframe->state.utime, keyframe->state.T_odom_body, keyframe->state.T_odom_body};
     if (update.loop) result_.loops.push_back(*update.loop);
     result_.loops.insert(result_.loops.end(), update.changed.begin(), update.changed.end());
-    if (update.accepted()) publish(update);
+    if (update.accepted()) {
+      publish(update);
+    } else {
+      note_refusal(*keyframe, update.reason);
+    }
   }
+}
+
+void ReplayFollower::note_refusal(const Keyframe& keyframe, const std::string& reason) {
+  if (result_.keyframes_refused++ > 0) return;
+  result_.first_refusal = std::format("{} of session {}: {}", keyframe.id, keyframe.session, reason);
 }
 
 void ReplayFollower::adopt_due_optimum() {
@@ -105,6 +115,7 @@ void ReplayFollower::rebuild_map() {
 
 /// Places the poses of this session where its graph has them in the end.
 void ReplayFollower::settle_graph() {
+  if (result_.solver_failure.empty()) result_.solver_failure = smoother_.stats().solver_failure;
   result_.optimum = batch_timer_.time([&] { return solve(smoother_.shadow_problem()); });
   correct_map(smoother_.adopt(result_.optimum));
   std::vector<KeyframeCorrection> corrections;
@@ -122,6 +133,7 @@ void ReplayFollower::settle_graph() {
 ReplayResult ReplayFollower::finish() {
   settle_graph();
   rebuild_map();
+  result_.map_refusals = map_.refused_poses();
   result_.graph = smoother_.pose_graph();
   result_.smoother = smoother_.stats();
   return std::move(result_);

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "backend/corrected_trajectory.h"
@@ -45,6 +46,7 @@ class ReplayFollower {
   void take_keyframe(const Keyframe& keyframe);
   void adopt_due_optimum();
   void publish(const SmootherUpdate& update);
+  void note_refusal(const Keyframe& keyframe, const std::string& reason);
   void settle_graph();
   void correct_map(const SmootherUpdate& update);
   void rebuild_map();

@@ -7,6 +7,7 @@
 #include "common/file_output.h"
 #include "common/fingerprint.h"
 #include "map/map_export.h"
+#include "replay_verdict.h"
 
 namespace ignis {
 namespace {
@@ -221,6 +222,10 @@ Json report(const runtime::Application& application, const ReplaySource& source,
   json["sessions"] = result.sessions;
   json["keyframes"] = result.smoother.keyframes;
   json["keyframes_without_imu"] = result.smoother.without_imu;
+  json["keyframes_refused"] = result.keyframes_refused;
+  json["map_refusals"] = result.map_refusals;
+  json["refusals"] = refusals(result);
+  json["solver_failure"] = result.solver_failure;
   json["loops_accepted"] = accepted;
   json["loops_kept"] = result.smoother.loops_kept;
   json["loops_withdrawn"] = result.smoother.loops_withdrawn;
@@ -376,6 +381,8 @@ std::string summary(const ReplaySource& source, const ReplayResult& result, cons
   if (result.sessions > 1)
     text += std::format("; of the last of {} sessions, which begin where the map is lost", result.sessions);
   text += '\n';
+  if (const std::string refused = refusals(result); !refused.empty()) text += std::format("refused:    {}\n", refused);
+  if (!result.solver_failure.empty()) text += std::format("graph ends: {}\n", result.solver_failure);
   text +=
       std::format("time:       {:.2f} s, {:.1f} times real time; a scan takes {:.2f} ms (median), {:.2f} ms (p99)\n",
                   timing.wall_s, seconds / std::max(timing.wall_s, 1e-9), quantile(result.scan_times_ms, 0.5),

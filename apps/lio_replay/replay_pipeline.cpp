@@ -32,23 +32,21 @@ void ReplayPipeline::add_scan(Scan scan) {
 }
 
 void ReplayPipeline::hand_over(ScanResult scan, double milliseconds) {
-  steps_.push({std::move(scan), milliseconds, false});
+  if (!steps_.push({std::move(scan), milliseconds})) std::rethrow_exception(failure_);
 }
 
 void ReplayPipeline::follow() {
-  for (Step step = steps_.pop(); !step.is_last; step = steps_.pop()) {
-    if (failure_) continue;  // the front end shall not wait for room for ever
-    try {
-      follower_.take(step.scan, step.milliseconds);
-    } catch (...) {
-      failure_ = std::current_exception();
-    }
+  try {
+    while (const std::optional<Step> step = steps_.pop()) follower_.take(step->scan, step->milliseconds);
+  } catch (...) {
+    failure_ = std::current_exception();
+    steps_.close();  // behind this the front end sees the failure, and does not wait for room for ever
   }
 }
 
 void ReplayPipeline::end_following() {
   if (!following_.joinable()) return;
-  steps_.push({{}, 0.0, true});
+  steps_.close();
   following_.join();
 }
 

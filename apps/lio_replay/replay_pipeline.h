@@ -21,6 +21,7 @@ class ReplayPipeline {
   ReplayPipeline(const ReplayPipeline&) = delete;
   ReplayPipeline& operator=(const ReplayPipeline&) = delete;
 
+  /// Both throw what back end or map have thrown meanwhile; then only the end of the pipeline may follow.
   void add_imu(const ImuSample& sample);
   void add_scan(Scan scan);
 
@@ -35,7 +36,6 @@ class ReplayPipeline {
   struct Step {
     ScanResult scan;
     double milliseconds = 0.0;
-    bool is_last = false;
   };
 
   void hand_over(ScanResult scan, double milliseconds);
@@ -48,7 +48,7 @@ class ReplayPipeline {
   std::map<std::string, std::int64_t> rejected_imu_;
   ReplayFollower follower_;
   BoundedQueue<Step> steps_;
-  std::exception_ptr failure_;  // of the other thread; behind it nothing is followed any more
+  std::exception_ptr failure_;  // of the other thread, written before it closes the queue
   std::thread following_;
 };
 

@@ -34,6 +34,11 @@ struct ReplayResult {
   std::string start;      ///< what the front end says about its start
   std::int64_t imu_samples = 0;
   std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
+  // Of all sessions: what graph and map did not take.
+  int keyframes_refused = 0;      ///< by the graph
+  std::string first_refusal;      ///< which keyframe, and why
+  std::string solver_failure;     ///< of the first graph that took no more keyframes; empty while all is well
+  std::int64_t map_refusals = 0;  ///< poses
 };
 
 }  // namespace ignis

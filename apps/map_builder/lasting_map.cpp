@@ -27,7 +27,9 @@ LastingMap::LastingMap(const MapConfig& config, const std::filesystem::path& fol
     : fingerprint_(fingerprint_of(config)),
       map_(config),
       journal_(folder.empty() ? nullptr : std::make_unique<MapJournal>(folder)) {
-  if (journal_) loaded_ = journal_->load(fingerprint_);
+  if (!journal_) return;
+  loaded_ = journal_->load(fingerprint_);
+  if (!journal_->damage().empty()) damage_ = "the map's journal is not whole: " + journal_->damage();
 }
 
 void LastingMap::begin_journal(std::int32_t session) {
@@ -37,34 +39,36 @@ void LastingMap::begin_journal(std::int32_t session) {
 }
 
 LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud) {
-  if (!loaded_) return {};
+  if (!loaded_) {
+    if (damage_.empty()) return {};
+    std::string damage = std::exchange(damage_, {});
+    return {.note = std::format("{}; the map begins anew", damage), .damage = damage};
+  }
+  std::string damage = std::exchange(damage_, {});
   const auto began = std::chrono::steady_clock::now();
   MapJournal::Loaded loaded = *std::exchange(loaded_, std::nullopt);
   const MapRecord& newest = *std::ranges::max_element(loaded.records, {}, &MapRecord::utime);
   const double absence = seconds_between(newest.utime, cloud.utime);
   if (loaded.head.session != cloud.session || !(absence > 0.0 && absence < kLongestAbsence)) {
     begin_session(cloud.session);
-    return {"the journal is of another drive; the map begins anew"};
+    return {.note = "the journal is of another drive; the map begins anew"};
   }
   number_ = written_ = newest.number;
   journal_->resume(loaded.head);
   session_ = loaded.head.session;
-  for (const MapRecord& record : loaded.records) {
-    if (record.is_keyframe) restored_[record.id] = record.utime;
-  }
   restore(map_, std::move(loaded.records));
   note_drops();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
-  return {std::format("goes on with {} keyframes, {} voxels after {:.1f} s, built in {:.2f} s{}{}",
-                      map_.clouds().size(), map_.voxels().size(), absence, spent.count(),
-                      loaded.damage.empty() ? "" : "; not whole: ", loaded.damage),
-          number_};
+  return {.note = std::format("goes on with {} keyframes, {} voxels after {:.1f} s, built in {:.2f} s{}{}",
+                              map_.clouds().size(), map_.voxels().size(), absence, spent.count(),
+                              damage.empty() ? "" : "; ", damage),
+          .newest = number_,
+          .damage = damage};
 }
 
 void LastingMap::begin_session(std::int32_t session) {
   map_.clear();
   loaded_.reset();
-  restored_.clear();
   session_.reset();  // the journal of this session may be that of another drive
   begin_journal(session);
 }
@@ -95,16 +99,6 @@ bool LastingMap::add_keyframe(const Keyframe& keyframe) {
 void LastingMap::write(MapRecord record) {
   record.number = written_ = number_;
   journal_->append(record);
-}
-
-bool LastingMap::is_of_another_drive(const Keyframe& keyframe) {
-  const auto same = restored_.find(keyframe.id);
-  const auto previous = restored_.find(keyframe.id - 1);
-  if (same == restored_.end() && previous == restored_.end()) return false;
-  const bool fits =
-      same != restored_.end() ? same->second == keyframe.state.utime : previous->second == keyframe.previous_utime;
-  restored_.clear();
-  return !fits;
 }
 
 void LastingMap::note_drops() {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,7 +16,7 @@ namespace ignis {
 /// with the same clouds.
 ///
 /// Session numbers begin at 0 in every drive, so the journal is used only when the first scan that arrives follows its
-/// newest within a minute; and a keyframe that contradicts it afterwards is of another drive.
+/// newest within a minute. Whether that was right the next keyframe tells (LiveMap::is_of_another_drive).
 class LastingMap {
  public:
   /// Reads what is in `folder`; empty: without a journal. Throws runtime::UserError when the folder cannot be used.
@@ -29,9 +28,9 @@ class LastingMap {
   [[nodiscard]] bool waits_for_scan() const { return loaded_.has_value(); }
 
   struct Beginning {
-    std::string note;  ///< what became of the journal, for people; empty when none waited
-    std::optional<std::int32_t>
-        newest{};  ///< running number of the map's newest cloud, when the journal is gone on with
+    std::string note;                      ///< what became of the journal, for people; empty when none waited
+    std::optional<std::int32_t> newest{};  ///< number of the map's newest cloud, when the journal is gone on with
+    std::string damage{};                  ///< what of the journal is lost
   };
 
   /// Goes on with the journal that waits, or begins a new one.
@@ -43,11 +42,8 @@ class LastingMap {
   InsertCounts insert_scan(const messages::PosedCloud& cloud);
   bool add_keyframe(const Keyframe& keyframe);
 
-  /// Whether a keyframe shows that the journal was gone on with by mistake.
-  [[nodiscard]] bool is_of_another_drive(const Keyframe& keyframe);
-
   /// Why the map is not in the journal; empty while all is well, and without a journal.
-  [[nodiscard]] std::string failure() const { return journal_ ? journal_->failure() : ""; }
+  [[nodiscard]] std::string failure() const { return journal_ ? journal_->failure() : std::string(); }
 
  private:
   void begin_journal(std::int32_t session);
@@ -58,8 +54,8 @@ class LastingMap {
   LiveMap map_;
   std::unique_ptr<MapJournal> journal_;
   std::optional<MapJournal::Loaded> loaded_;
-  std::optional<std::int32_t> session_;     ///< of the journal that is being written
-  std::map<std::int32_t, Utime> restored_;  ///< [us] stamps of keyframes, until one that arrives has confirmed them
+  std::string damage_;                   ///< of the journal, until the first scan
+  std::optional<std::int32_t> session_;  ///< of the journal that is being written
   std::int64_t dropped_ = 0;
   std::int32_t number_ = 0;   ///< of the newest cloud
   std::int32_t written_ = 0;  ///< number in the newest record

@@ -44,16 +44,13 @@ MapJournal::~MapJournal() { close_file(); }
 MapJournal::File MapJournal::read(const fs::path& path) {
   const std::vector<std::byte> bytes = read_bytes(path);
   File file;
-  bool has_head = false;
   while (file.whole_bytes < bytes.size() && file.damage.empty()) {
     const RecordAt at = record_at(bytes, file.whole_bytes);
     if (!at.damage.empty()) {
       file.damage = at.damage;
-    } else if (!has_head) {
-      const auto head = decode_head(at.payload);
-      has_head = head.has_value();
-      if (has_head) file.head = *head;
-      if (!has_head) file.damage = "no head";
+    } else if (!file.head) {
+      file.head = decode_head(at.payload);
+      if (!file.head) file.damage = "no head";
     } else if (auto record = decode_record(at.payload)) {
       file.records.push_back(std::move(*record));
     } else {
@@ -67,20 +64,30 @@ MapJournal::File MapJournal::read(const fs::path& path) {
 
 std::optional<MapJournal::Loaded> MapJournal::load(const std::string& config_fingerprint) {
   std::optional<Loaded> loaded;
+  damage_.clear();
+  damaged_files_ = 0;
   for (const fs::path& path : files_of(folder_.path())) {
     File file = read(path);
-    const MapRecordHead here{kMapRecordVersion, config_fingerprint, file.head.session};
-    if (file.records.empty() || file.head != here) continue;
+    const MapRecordHead here{kMapRecordVersion, config_fingerprint, file.head ? file.head->session : 0};
+    // A file that does not even say what it belongs to may be ours.
+    if (!file.damage.empty() && (!file.head || *file.head == here)) {
+      damage_ = file.damage;
+      ++damaged_files_;
+    }
+    if (file.records.empty() || *file.head != here) continue;
     if (!loaded || loaded->head.session < here.session) {
-      loaded = Loaded{.head = here, .records = {}, .damage = {}};
+      loaded = Loaded{.head = here, .records = {}};
       sizes_.clear();
     }
     if (loaded->head != here) continue;
     sizes_[file.records.front().id] = file.whole_bytes;
     std::ranges::move(file.records, std::back_inserter(loaded->records));
-    if (!file.damage.empty()) loaded->damage = file.damage;
   }
   return loaded;
+}
+
+std::string MapJournal::damage() const {
+  return damaged_files_ > 1 ? std::format("{} files, among them {}", damaged_files_, damage_) : damage_;
 }
 
 void MapJournal::begin(const MapRecordHead& head) {
@@ -92,6 +99,7 @@ void MapJournal::resume(const MapRecordHead& head) {
   close_file();
   head_ = head;
   failure_.clear();
+  lost_ = 0;
   for (const fs::path& path : files_of(folder_.path())) {
     const auto known = std::ranges::find_if(sizes_, [&](const auto& each) { return path_of(each.first) == path; });
     if (known == sizes_.end()) {
@@ -119,7 +127,10 @@ void MapJournal::open_for(std::int32_t id) {
 
 void MapJournal::append(const MapRecord& record) {
   open_for(record.id);
-  if (file_ < 0) return;
+  if (file_ < 0) {
+    ++lost_;
+    return;
+  }
   std::vector<std::byte> bytes;
   if (sizes_[record.id] == 0) bytes = encode_record(encode(head_));
   std::ranges::copy(encode_record(encode(record)), std::back_inserter(bytes));
@@ -136,12 +147,16 @@ void MapJournal::write(const std::vector<std::byte>& bytes) {
       const int error = errno;
       static_cast<void>(ftruncate(file_, static_cast<off_t>(sizes_[file_id_])));
       fail("cannot be written", error);
+      ++lost_;
       return;
     }
     written += static_cast<std::size_t>(count);
   }
   sizes_[file_id_] += written;
-  failure_.clear();
+}
+
+std::string MapJournal::failure() const {
+  return lost_ > 0 ? std::format("{}; {} records are lost", failure_, lost_) : failure_;
 }
 
 void MapJournal::forget_dropped(const KeyframeClouds& clouds) {

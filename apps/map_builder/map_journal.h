@@ -20,13 +20,13 @@ namespace ignis {
 ///
 /// A record is handed to the kernel at once, so a killed process loses none; it is not synced, since after a power cut
 /// the drive is over. With a keyframe that the map has dropped its file goes, so the folder is bounded as the map is:
-/// 16 bytes a point. What cannot be written shows in failure(), and the map goes on without it.
+/// 16 bytes a point. What cannot be written shows in failure(), and the map goes on without it. The records of a
+/// keyframe whose own is lost help nobody: restore() leaves them out.
 class MapJournal {
  public:
   struct Loaded {
     MapRecordHead head;
     std::vector<MapRecord> records;
-    std::string damage;  ///< of the last file that is not whole; empty when all are
   };
 
   /// Makes and locks the folder. Throws runtime::UserError that names folder and reason.
@@ -37,6 +37,9 @@ class MapJournal {
 
   /// What an earlier process has left under this configuration: of its newest session every whole record.
   [[nodiscard]] std::optional<Loaded> load(const std::string& config_fingerprint);
+
+  /// Which files load() has found that are not whole; empty when all are.
+  [[nodiscard]] std::string damage() const;
 
   /// Begins anew; what was there goes.
   void begin(const MapRecordHead& head);
@@ -49,12 +52,12 @@ class MapJournal {
   /// Removes the files of keyframes that the map no longer holds.
   void forget_dropped(const KeyframeClouds& clouds);
 
-  /// Why the newest record is not in its file; empty while all is well.
-  [[nodiscard]] const std::string& failure() const { return failure_; }
+  /// Why records are not in their files, and how many; empty while all are. What is lost is lost until begin().
+  [[nodiscard]] std::string failure() const;
 
  private:
   struct File {
-    MapRecordHead head;
+    std::optional<MapRecordHead> head;
     std::vector<MapRecord> records;
     std::size_t whole_bytes = 0;
     std::string damage;
@@ -73,6 +76,9 @@ class MapJournal {
   int file_ = -1;
   std::int32_t file_id_ = 0;  ///< of the one that is open
   std::string failure_;
+  std::int64_t lost_ = 0;
+  std::string damage_;  ///< of the last file that is not whole
+  int damaged_files_ = 0;
 };
 
 }  // namespace ignis

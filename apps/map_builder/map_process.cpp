@@ -21,8 +21,8 @@ constexpr milliseconds kHudPeriod{100};
 constexpr std::chrono::seconds kReportPeriod{1};
 constexpr std::size_t kMaxRequestedIds = 32;
 constexpr int kMaxRequests = 5;  // the front end keeps a ring: what it no longer has will never come
-
 constexpr int kHealthQueue = 100;
+constexpr std::chrono::seconds kRefusalTold{3};
 
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
@@ -37,7 +37,8 @@ MapProcess::MapProcess(const runtime::Application& application, const runtime::H
       server_(hmi, stream_terms(map_config_, hmi)),
       lasting_(map_config_, journal_folder),
       frame_period_(
-          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))) {
+          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))),
+      other_sessions_(kRefusalTold) {
   hud_.map.address = server_.address();
   hud_.band_radii = {map_config_.local_window_m, map_config_.mid_window_m, map_config_.coarse_window_m};
   subscribe(application.config.lcm);
@@ -76,15 +77,17 @@ void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
       runtime::Senders::kSeveral));
 }
 
+/// Whether a message is of the session that is shown, which the first one of all decides.
 bool MapProcess::accept_session(std::int32_t session) {
-  if (session_ && session < *session_) return false;
-  if (session_ && session > *session_) begin_session(session);
-  session_ = session;
-  return true;
+  if (!session_) session_ = session;
+  if (session == *session_) return true;
+  ++of_other_sessions_;
+  return false;
 }
 
 /// A new odom frame: nothing of the old map can be placed in it.
 void MapProcess::begin_session(std::int32_t session) {
+  session_ = session;
   lasting_.begin_session(session);
   missed_ = {};
   loops_.clear();
@@ -110,10 +113,15 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
     ++refused_clouds_;
     return;
   }
+  if (lasting_.waits_for_scan()) session_ = cloud.session;
+  // The front end's next session begins with a scan. Any other one takes a keyframe: it says more of where it belongs.
+  if (session_ && std::int64_t{cloud.session} == std::int64_t{*session_} + 1) begin_session(cloud.session);
   if (!accept_session(cloud.session)) return;
   if (const LastingMap::Beginning beginning = lasting_.begin_with(cloud); !beginning.note.empty()) {
     std::cerr << "map_builder: " << beginning.note << std::endl;
     keyframes_changed_ = true;
+    journal_damage_ = beginning.damage;
+    journal_damage_s_ = now_s();
     if (beginning.newest) missed_.begin(*beginning.newest, cloud.sequence, now_s());
   }
   if (missed_.waiting()) {
@@ -126,7 +134,7 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
 
 void MapProcess::on_cloud_again(const messages::PosedCloud& cloud) {
   if (!missed_.waiting() || cloud.session != session_ || !usable(cloud.T_odom_body)) return;
-  missed_.hold(cloud, now_s());
+  missed_.hold_again(cloud, now_s());
   catch_up();
 }
 
@@ -154,7 +162,10 @@ void MapProcess::insert(const messages::PosedCloud& cloud) {
 
 void MapProcess::on_keyframe(const Keyframe& keyframe) {
   if (refuse_pose(keyframe.state.T_odom_body)) return;
-  if (!accept_session(keyframe.session) || lasting_.waits_for_scan()) return;
+  if (lasting_.waits_for_scan()) return;
+  // A front end that starts cold counts sessions from 0, so a smaller number is as good as a greater one.
+  if (keyframe.id >= 0 && session_ && keyframe.session != *session_) begin_session(keyframe.session);
+  if (!accept_session(keyframe.session)) return;
   if (missed_.waiting()) {
     missed_.hold(keyframe);
   } else {
@@ -163,7 +174,7 @@ void MapProcess::on_keyframe(const Keyframe& keyframe) {
 }
 
 void MapProcess::insert(const Keyframe& keyframe) {
-  if (lasting_.is_of_another_drive(keyframe)) begin_session(keyframe.session);
+  if (map_.is_of_another_drive(keyframe)) begin_session(keyframe.session);
   if (map_.clouds().contains(keyframe.id) || !lasting_.add_keyframe(keyframe)) return;
   events_.keyframe(keyframe.state.utime, keyframe.id);
   map_changed_ = keyframes_changed_ = true;
@@ -296,23 +307,26 @@ void MapProcess::update_status() {
   hud_.processes = processes_.rows();
 }
 
+/// Why the map is not what it should be; empty while it is.
+std::string MapProcess::trouble() {
+  const bool session_trouble = other_sessions_.look(of_other_sessions_, Clock::now());
+  if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
+  if (std::string failure = lasting_.failure(); !failure.empty()) return failure;
+  if (std::string missing = missed_.trouble(now_s()); !missing.empty()) return missing;
+  if (!journal_damage_.empty() && now_s() - journal_damage_s_ < MissedScans::kTold_s) return journal_damage_;
+  if (session_trouble) {
+    return std::format("{} messages of another session than {} refused", of_other_sessions_, session_.value_or(0));
+  }
+  const std::int64_t poses = refused_messages_ + map_.refused_poses();
+  if (refused_clouds_ + poses > 0) return std::format("{} clouds and {} poses refused", refused_clouds_, poses);
+  return {};
+}
+
 void MapProcess::report() {
   update_status();
-  std::int8_t state = health_t::OK;
-  hud_.health = "OK";
-  if (map_.voxels().coarsening() > 0) {
-    state = health_t::DEGRADED;
-    hud_.health = "DEGRADED: map.max_voxels is reached, the finest level is left out";
-  } else if (const std::string failure = lasting_.failure(); !failure.empty()) {
-    state = health_t::DEGRADED;
-    hud_.health = "DEGRADED: " + failure;
-  } else if (const std::string missing = missed_.trouble(now_s()); !missing.empty()) {
-    state = health_t::DEGRADED;
-    hud_.health = "DEGRADED: " + missing;
-  } else if (const std::int64_t poses = refused_messages_ + map_.refused_poses(); refused_clouds_ + poses > 0) {
-    state = health_t::DEGRADED;
-    hud_.health = std::format("DEGRADED: {} clouds and {} poses refused", refused_clouds_, poses);
-  }
+  const std::string why = trouble();
+  const std::int8_t state = why.empty() ? health_t::OK : health_t::DEGRADED;
+  hud_.health = why.empty() ? "OK" : "DEGRADED: " + why;
   ViewUpdate update;
   update.api_status = shared(status_json(hud_, budget_, server_.counters(), pictures_, loops_.text()));
   server_.publish(std::move(update));

@@ -20,6 +20,7 @@
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
 #include "runtime/lcm_link.h"
+#include "runtime/recent_rise.h"
 
 namespace ignis {
 
@@ -44,6 +45,7 @@ class MapProcess {
   [[nodiscard]] bool accept_session(std::int32_t session);
   void begin_session(std::int32_t session);
   [[nodiscard]] bool refuse_pose(const Pose& pose);
+  [[nodiscard]] std::string trouble();
   void on_cloud(const messages::PosedCloud& cloud);
   void on_cloud_again(const messages::PosedCloud& cloud);
   void insert(const messages::PosedCloud& cloud);
@@ -101,8 +103,12 @@ class MapProcess {
   std::map<double, PictureBuilder> builders_;  // by view radius [m], as are the pictures
   std::map<double, SharedPicture> pictures_;
   std::int64_t picture_number_ = 0;
+  std::string journal_damage_;
+  double journal_damage_s_ = 0.0;  // when it was found
   std::int64_t refused_clouds_ = 0;
-  std::int64_t refused_messages_ = 0;  // with a pose that no map can hold
+  std::int64_t refused_messages_ = 0;   // with a pose that no map can hold
+  std::int64_t of_other_sessions_ = 0;  // refused as well
+  runtime::RecentRise other_sessions_;
   std::int32_t graph_keyframes_ = 0;
   std::map<std::int32_t, int> request_counts_;
   std::int32_t request_sequence_ = 0;

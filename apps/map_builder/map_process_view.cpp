@@ -20,6 +20,7 @@ namespace channels = runtime::channels;
 constexpr double kPathBytesPerSecond = 15'000.0;
 constexpr double kPathPointBytes = 12.0;
 constexpr std::chrono::milliseconds kMinPathPeriod{300};
+
 }  // namespace
 
 void MapProcess::answer_viewers() {

@@ -36,7 +36,11 @@ void MissedScans::begin(std::int32_t newest, std::int32_t first, double now_s) {
 }
 
 void MissedScans::hold(const messages::PosedCloud& cloud, double now_s) {
-  if (!newest_ || cloud.sequence < *newest_) return;
+  if (!newest_) return;
+  if (cloud.sequence < *newest_) {
+    counted_anew_.push_back(cloud);
+    return;
+  }
   const std::int32_t number = cloud.sequence;
   // Those that arrive of themselves close no gap.
   if (!clouds_.empty() && number < clouds_.rbegin()->first) progress_s_ = now_s;
@@ -45,6 +49,10 @@ void MissedScans::hold(const messages::PosedCloud& cloud, double now_s) {
     return;
   }
   if (clouds_.try_emplace(number, cloud).second) points_ += cloud.points.size();
+}
+
+void MissedScans::hold_again(const messages::PosedCloud& cloud, double now_s) {
+  if (newest_ && cloud.sequence >= *newest_) hold(cloud, now_s);
 }
 
 void MissedScans::hold(const Keyframe& keyframe) {
@@ -82,11 +90,13 @@ std::vector<std::int32_t> MissedScans::ask(double now_s) {
 std::vector<MapInput> MissedScans::take(double now_s) {
   if (!newest_ || clouds_.empty()) return {};
   const std::int64_t missing = missing_count();
-  if (missing > 0 && now_s - progress_s_ < kGiveUp_s && points_ <= kMostPoints) return {};
+  const bool may_come = counted_anew_.empty() && now_s - progress_s_ < kGiveUp_s && points_ <= kMostPoints;
+  if (missing > 0 && may_come) return {};
   std::vector<MapInput> inputs;
   for (auto& [number, cloud] : clouds_) inputs.emplace_back(std::move(cloud));
   for (auto& [id, keyframe] : keyframes_) inputs.emplace_back(std::move(keyframe));
   std::ranges::stable_sort(inputs, {}, place_of);
+  for (messages::PosedCloud& cloud : counted_anew_) inputs.emplace_back(std::move(cloud));
   // The map has the newest one already: what may lack is the keyframe made of it, and that is asked for anyway.
   const std::int64_t lost = missing - (newest_came_again_ ? 0 : 1);
   *this = {};
@@ -100,6 +110,7 @@ void MissedScans::give_up(const std::string& what, double now_s) {
 }
 
 std::string MissedScans::trouble(double now_s) const {
+  if (waiting()) return std::format("waiting for {} scans of the map's restart", missing_count());
   return now_s - given_up_s_ < kTold_s ? given_up_ : std::string();
 }
 

@@ -45,7 +45,13 @@ class MissedScans {
   /// Whether everything that arrives has to be held back.
   [[nodiscard]] bool waiting() const { return newest_.has_value(); }
 
+  /// A cloud of LIO_CLOUD. One before the newest says that the front end was started anew meanwhile and has forgotten
+  /// what is asked for: the wait ends.
   void hold(const messages::PosedCloud& cloud, double now_s);
+
+  /// A cloud of LIO_CLOUD_AGAIN, which somebody else may have asked for.
+  void hold_again(const messages::PosedCloud& cloud, double now_s);
+
   void hold(const Keyframe& keyframe);
 
   /// Numbers of the clouds to ask for now, the newest first: the oldest go first at the front end. Often empty.
@@ -54,7 +60,7 @@ class MissedScans {
   /// Once nothing is missing, or is given up: everything held back, in the order in which it was made. Else nothing.
   [[nodiscard]] std::vector<MapInput> take(double now_s);
 
-  /// What was given up lately, for people; empty when nothing was.
+  /// What is waited for, or was given up lately, for people; empty otherwise.
   [[nodiscard]] std::string trouble(double now_s) const;
 
  private:
@@ -67,6 +73,7 @@ class MissedScans {
   bool newest_came_again_ = false;      // and so did the keyframe that was made of it, if there is one
   std::map<std::int32_t, messages::PosedCloud> clouds_;
   std::map<std::int32_t, Keyframe> keyframes_;
+  std::vector<messages::PosedCloud> counted_anew_;
   std::size_t points_ = 0;
   std::vector<std::int32_t> asked_;
   double asked_s_ = 0.0;

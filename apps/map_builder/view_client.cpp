@@ -6,13 +6,13 @@
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <nlohmann/json.hpp>
 
 #include "map/stream_encoding.h"
+#include "map_builder/rethrow.h"
 #include "map_builder/stream_texts.h"
 #include "map_builder/tcp_progress.h"
 
@@ -53,7 +53,7 @@ net::awaitable<void> ViewClient::serve(const Request& upgrade) {
   last_life_ = Clock::now();
   answers_.push_back({shared(context_.hello()), nullptr});
   context_.on_view_changed();
-  net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, net::detached);
+  net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, kRethrow);
   co_await read_loop();
   close();
 }
@@ -108,7 +108,7 @@ void ViewClient::on_control(websocket::frame_type kind) {
     if (std::exchange(too_demanding_, true)) return;
     ++context_.counters.policy_closes;
     const auto close_it = [self = shared_from_this()] { return self->refuse(websocket::close_code::policy_error); };
-    net::co_spawn(stream_.get_executor(), close_it, net::detached);
+    net::co_spawn(stream_.get_executor(), close_it, kRethrow);
   } else if (kind == websocket::frame_type::pong) {
     if (std::exchange(awaits_pong_, false)) round_trip_ = last_life_ - batch_began_;
     wake();

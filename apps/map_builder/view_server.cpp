@@ -8,7 +8,6 @@
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -19,6 +18,7 @@
 #include "map/stream_encoding.h"
 #include "map_builder/listening_socket.h"
 #include "map_builder/request_rules.h"
+#include "map_builder/rethrow.h"
 #include "map_builder/stream_options.h"
 #include "map_builder/web_files.h"
 
@@ -89,9 +89,18 @@ ViewServer::ViewServer(const runtime::HmiConfig& config, StreamTerms terms)
     const std::lock_guard lock(mutex_);
     if (requests_.size() < kMaxRequests) requests_.push_back({viewer, request});
   };
-  net::co_spawn(context_, accept_loop(), net::detached);
-  net::co_spawn(context_, watch_viewers(), net::detached);
-  thread_ = std::thread([this] { context_.run(); });
+  net::co_spawn(context_, accept_loop(), kRethrow);
+  net::co_spawn(context_, watch_viewers(), kRethrow);
+  thread_ = std::thread([this] { serve(); });
+}
+
+void ViewServer::serve() {
+  try {
+    context_.run();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
+  }
 }
 
 ViewServer::~ViewServer() {
@@ -121,6 +130,7 @@ void ViewServer::update_radii() {
 
 std::vector<ViewerRequest> ViewServer::take_requests() {
   const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(failure_);
   return std::exchange(requests_, {});
 }
 
@@ -151,7 +161,7 @@ net::awaitable<void> ViewServer::accept_loop() {
   while (acceptor_.is_open()) {
     auto [error, socket] = co_await acceptor_.async_accept(kNoThrow);
     if (!error) {
-      net::co_spawn(context_, serve_connection(std::move(socket)), net::detached);
+      net::co_spawn(context_, serve_connection(std::move(socket)), kRethrow);
       continue;
     }
     // Out of descriptors: wait until a viewer leaves instead of spinning.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <exception>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -33,7 +34,8 @@ struct ViewerRequest {
 
 /// HTTP and WebSocket server of the browser view: `GET /` and its files from the built-in table, `GET /api/status`,
 /// `WS /ws/lio_map` with the subprotocol of stream_encoding.h. Runs on one thread of its own; the public calls may come
-/// from any other thread and never wait for a viewer.
+/// from any other thread and never wait for a viewer. What its thread throws (no memory, as a rule) ends the serving,
+/// and take_requests() throws it again: a view that is dead must not look alive.
 class ViewServer {
  public:
   /// Opens the port. Throws runtime::UserError when it cannot.
@@ -54,7 +56,8 @@ class ViewServer {
   /// Puts news on the board; every viewer takes them when it is ready.
   void publish(ViewUpdate update);
 
-  /// What viewers asked for since the last call. At most kMaxRequests wait; further ones are dropped.
+  /// What viewers asked for since the last call. At most kMaxRequests wait; further ones are dropped. Throws what the
+  /// server's thread has thrown.
   [[nodiscard]] std::vector<ViewerRequest> take_requests();
 
   /// Answers a viewer, if it is still there.
@@ -69,6 +72,7 @@ class ViewServer {
   using Response = boost::beast::http::response<boost::beast::http::string_body>;
   using Socket = boost::asio::ip::tcp::socket;
 
+  void serve();
   boost::asio::awaitable<void> accept_loop();
   boost::asio::awaitable<void> watch_viewers();
   boost::asio::awaitable<void> serve_connection(Socket socket);
@@ -82,9 +86,10 @@ class ViewServer {
   StreamTerms terms_;
   std::atomic<int> client_count_ = 0;
   std::atomic<bool> view_changed_ = false;
-  mutable std::mutex mutex_;  // guards the next two
+  mutable std::mutex mutex_;  // guards the next three
   std::set<double> radii_;
   std::vector<ViewerRequest> requests_;
+  std::exception_ptr failure_;  // of the server's thread, which has ended then
   // Below: the server's thread only, but for the counters.
   ViewerContext viewers_;
   std::map<std::int64_t, std::shared_ptr<ViewClient>> clients_;

@@ -2,6 +2,7 @@
 #include "drivers/packet_stream.h"
 
 #include <cmath>
+#include <format>
 #include <utility>
 
 #include "drivers/value_checks.h"
@@ -19,6 +20,18 @@ constexpr double kPhaseLostUs = 200'000.0;
 constexpr double kSensorTimeLeapS = 0.5;
 
 }  // namespace
+
+std::string damage_in(const StreamCounters& counters) {
+  const bool is_damaged = counters.framing.crc_errors + counters.framing.skipped_bytes + counters.scan_gaps +
+                              counters.imu_gaps + counters.duplicates + counters.rejected_values >
+                          0;
+  if (!is_damaged) return {};
+  return std::format(
+      "damage in the stream: {} checksum errors, {} bytes outside frames, {} pairs and {} inertial samples missing, {} "
+      "halves without partner, {} repeats, {} frames with impossible values",
+      counters.framing.crc_errors, counters.framing.skipped_bytes, counters.scan_gaps, counters.imu_gaps,
+      counters.pairing.unpaired, counters.duplicates, counters.rejected_values);
+}
 
 PacketStream::PacketStream(const DriverConfig& config)
     : config_(config), scans_(kScanPeriodUs), samples_(kImuPeriodUs) {}

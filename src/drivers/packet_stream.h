@@ -50,6 +50,9 @@ struct StreamCounters {
   std::int64_t restarts = 0;          ///< CountersRestarted
 };
 
+/// What of a recorded stream is lost or was not sound, for people; empty when it is whole.
+[[nodiscard]] std::string damage_in(const StreamCounters& counters);
+
 /// Latest figures that the sensor tells about itself.
 struct Housekeeping {
   float apd_temperature = -1000.0F;  ///< [deg C]; -1000 until known

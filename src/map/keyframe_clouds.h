@@ -26,8 +26,8 @@ namespace ignis {
 ///
 /// Bounded: beyond `max_points` the clouds that are farthest (horizontally, in odom) from the newest keyframe are to be
 /// dropped, a sixteenth of the bound at a time, since what they leave has to be filled from the others. When the open
-/// one alone is that large, it takes no more. Memory: 16 bytes per point, 20 per block of 2 m, and
-/// for the open keyframe 19 to 39 per block of 4x4x4 cells beside. With rays followed, 4 bytes per free cell.
+/// one alone is that large, it takes no more. Memory: 16 bytes per point, 20 per block of 2 m, and for the open
+/// keyframe 19 to 39 per block of 4x4x4 cells beside. With rays followed, 4 bytes per free cell.
 class KeyframeClouds {
  public:
   static constexpr std::int32_t kBeforeFirst = -1;

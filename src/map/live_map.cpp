@@ -63,6 +63,7 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   Node& node = nodes_[keyframe.id];
   if (node.has_cloud) return true;
   node.has_cloud = true;
+  node.utime = keyframe.state.utime;
   node.T_odom_keyframe = T_odom_keyframe;
   if (!node.corrected) node.T_map_keyframe = T_map_odom_ * T_odom_keyframe;
   const KeyframeClouds::Kept kept = clouds_.add_keyframe(keyframe.id, keyframe.cloud, T_odom_keyframe);
@@ -72,6 +73,16 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   drop_far_clouds();
   settle();  // the first keyframe tells where what came before belongs
   return true;
+}
+
+bool LiveMap::is_of_another_drive(const Keyframe& keyframe) const {
+  if (const auto same = nodes_.find(keyframe.id); same != nodes_.end() && same->second.has_cloud) {
+    return same->second.utime != keyframe.state.utime ||
+           same->second.T_odom_keyframe.translation != keyframe.state.T_odom_body.translation;
+  }
+  if (keyframe.id <= 0) return false;
+  const auto previous = nodes_.find(keyframe.id - 1);
+  return previous != nodes_.end() && previous->second.has_cloud && previous->second.utime != keyframe.previous_utime;
 }
 
 /// Draws points that a keyframe has just kept.

@@ -65,6 +65,10 @@ class LiveMap {
   /// A keyframe; known ids are ignored. False when its pose is unusable.
   bool add_keyframe(const Keyframe& keyframe);
 
+  /// Whether a keyframe is of another drive although its session may be the same: a front end that starts anew counts
+  /// from 0 again. Told by the stamps and places of the keyframes that the map has had.
+  [[nodiscard]] bool is_of_another_drive(const Keyframe& keyframe) const;
+
   /// Which points of the newest scan or keyframe say something new. The same calls with these points alone make the
   /// same map, unless it carves: then every ray counts. Valid until the next call.
   [[nodiscard]] std::span<const std::uint32_t> newest_kept() const { return newest_kept_; }
@@ -113,6 +117,7 @@ class LiveMap {
 
  private:
   struct Node {
+    Utime utime = 0;
     Pose T_odom_keyframe;
     Pose T_map_keyframe;  // newest
     bool has_cloud = false;

@@ -83,6 +83,7 @@ void restore(LiveMap& map, std::vector<MapRecord> records) {
     if (record.is_keyframe) {
       Keyframe keyframe;
       keyframe.id = record.id;
+      keyframe.state.utime = record.utime;
       keyframe.state.T_odom_body = record.T_odom_body;
       keyframe.cloud = std::move(record.points);
       if (map.add_keyframe(keyframe)) placed.insert(record.id);

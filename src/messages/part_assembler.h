@@ -24,7 +24,8 @@ inline constexpr std::int16_t kMostParts = 1024;
 
 /// Collects the numbered parts of one sequence and hands them over, in order, when the last one is in. A part of a
 /// newer sequence ends the wait for the older one, which is then counted as incomplete. Parts of one sequence may
-/// arrive in any order and more than once.
+/// arrive in any order and more than once, also behind the last one: what is left of a sequence that has been handed
+/// over is no loss.
 template <class Message>
 class PartAssembler {
  public:
@@ -39,12 +40,16 @@ class PartAssembler {
       return std::vector<Message>{part};
     }
     if (parts_.empty() || sequence_ != part.sequence || part_count_ != part.part_count) {
+      const bool is_repeat = part.sequence == whole_sequence_ && part.part_count == whole_part_count_;
+      if (is_repeat && !parts_.empty()) return std::nullopt;
       abandon();
       sequence_ = part.sequence;
       part_count_ = part.part_count;
     }
     parts_.insert_or_assign(part.part, part);
     if (std::ssize(parts_) < part_count_) return std::nullopt;
+    whole_sequence_ = sequence_;
+    whole_part_count_ = part_count_;
     std::vector<Message> complete;
     complete.reserve(parts_.size());
     for (auto& [number, each] : parts_) complete.push_back(std::move(each));
@@ -60,7 +65,8 @@ class PartAssembler {
 
  private:
   void abandon() {
-    if (!parts_.empty()) ++incomplete_;
+    const bool is_repeat = sequence_ == whole_sequence_ && part_count_ == whole_part_count_;
+    if (!parts_.empty() && !is_repeat) ++incomplete_;
     parts_.clear();
   }
 
@@ -69,6 +75,9 @@ class PartAssembler {
   std::int64_t incomplete_ = 0;
   std::int32_t sequence_ = 0;
   std::int16_t part_count_ = 0;
+  // Of the sequence that was handed over last; no parts: of none.
+  std::int32_t whole_sequence_ = 0;
+  std::int16_t whole_part_count_ = 0;
 };
 
 }  // namespace ignis::messages

@@ -51,6 +51,37 @@ bool shows(const LiveMap& map, const Eigen::Vector3d& p) {
   return map.voxels().find(0, map.voxels().locator().cell_of(0, p)).has_value();
 }
 
+Keyframe stamped(std::int32_t id, Utime previous_utime, Utime utime, const Pose& T_odom_body = {}) {
+  Keyframe made = keyframe(id, T_odom_body);
+  made.previous_utime = previous_utime;
+  made.state.utime = utime;
+  return made;
+}
+
+TEST(LiveMap, TellsAKeyframeOfAnotherDriveByWhatItKnowsOfIdAndPredecessor) {
+  LiveMap map(MapConfig{});
+  map.add_keyframe(stamped(0, 100, 100));
+  map.add_keyframe(stamped(1, 100, 200, pose_at(2, 0, 0)));
+  map.correct(Pose{}, std::vector{CorrectedPose{3, pose_at(6, 0, 0)}});
+  EXPECT_FALSE(map.is_of_another_drive(stamped(1, 100, 200, pose_at(2, 0, 0)))) << "sent again";
+  EXPECT_FALSE(map.is_of_another_drive(stamped(2, 200, 300)));
+  EXPECT_FALSE(map.is_of_another_drive(stamped(3, 300, 400))) << "only its corrected pose is known";
+  EXPECT_FALSE(map.is_of_another_drive(stamped(9, 800, 900)));
+  EXPECT_TRUE(map.is_of_another_drive(stamped(0, 101, 101)));
+  EXPECT_TRUE(map.is_of_another_drive(stamped(1, 100, 200, pose_at(3, 0, 0)))) << "another odom";
+  EXPECT_TRUE(map.is_of_another_drive(stamped(2, 201, 300)));
+  map.clear();
+  EXPECT_FALSE(map.is_of_another_drive(stamped(0, 101, 101)));
+}
+
+TEST(LiveMap, FindsNoPredecessorOfTheSmallestIds) {
+  using Limits = std::numeric_limits<std::int32_t>;
+  LiveMap map(MapConfig{});
+  map.add_keyframe(stamped(Limits::max(), 100, 100));
+  EXPECT_FALSE(map.is_of_another_drive(stamped(Limits::min(), 7, 8)));
+  EXPECT_FALSE(map.is_of_another_drive(stamped(0, 7, 7)));
+}
+
 TEST(LiveMap, PlacesScansByTheCurrentCorrection) {
   LiveMap map(MapConfig{});
   map.correct(pose_at(100, 0, 50, 0.5), {});

@@ -16,6 +16,18 @@ URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 SCAN_PERIOD = 0.05
 SPEED = 2.0
 WALL_X = 3.0
+LARGEST = 2**31 - 1
+
+
+def forged_message(channel):
+    """Well-formed, and of a session that nobody drives."""
+    kinds = {"LIO_CLOUD": types.cloud_t, "LOOP_RESULT": types.loop_result_t}
+    message = kinds.get(channel, types.smoothed_keyframes_t)()
+    message.session = LARGEST
+    sound = {"part_count": 1, "quaternion": [1.0, 0.0, 0.0, 0.0], "map_odom_quaternion": [1.0, 0.0, 0.0, 0.0]}
+    for name in sound.keys() & set(message.__slots__):
+        setattr(message, name, sound[name])
+    return channel, message.encode()
 
 
 def hall_scan(position, generator, points=1500):
@@ -32,8 +44,9 @@ def hall_scan(position, generator, points=1500):
 class Drive:
     """Publishes what the front end and the back end would: a straight drive along -Z, a keyframe every 2 m."""
 
-    def __init__(self, drift=0.0):
+    def __init__(self, drift=0.0, session=0):
         self.bus = lcm.LCM(URL)
+        self.session = session
         self.generator = np.random.default_rng(7)
         self.step = 0
         self.drift = drift
@@ -73,6 +86,7 @@ class Drive:
     def publish_cloud(self, position, scan):
         cloud = types.cloud_t()
         cloud.utime, cloud.sequence, cloud.part_count, cloud.applied = self.stamp(), self.step, 1, 1
+        cloud.session = self.session
         cloud.position, cloud.quaternion = list(position), [1.0, 0.0, 0.0, 0.0]
         cloud.num_points = len(scan)
         cloud.x, cloud.y, cloud.z = (list(map(float, scan[:, axis])) for axis in range(3))
@@ -97,7 +111,7 @@ class Drive:
     def publish_keyframe(self, position, scan):
         keyframe = types.keyframe_t()
         keyframe.id = keyframe.sequence = len(self.keyframes)
-        keyframe.utime = self.stamp()
+        keyframe.utime, keyframe.session = self.stamp(), self.session
         keyframe.previous_utime = self.last_keyframe_stamp if self.keyframes else keyframe.utime
         self.last_keyframe_stamp = keyframe.utime
         keyframe.part_count, keyframe.imu_complete, keyframe.resolution = 1, 1, 0.001
@@ -109,8 +123,13 @@ class Drive:
         self.bus.publish("LIO_KEYFRAME", keyframe.encode())
         self.sent.setdefault(self.step, []).insert(0, ("LIO_KEYFRAME", keyframe.encode()))
 
+    def start_cold(self, session=0):
+        """The front end begins another drive: keyframes count from 0 again."""
+        self.session, self.keyframes = session, []
+
     def publish_loop(self):
         loop = types.loop_result_t()
+        loop.session = self.session
         loop.keyframes, loop.candidates, loop.passed, loop.accepted = len(self.keyframes), 1, 1, 1
         loop.from_id, loop.to_id, loop.correction_m = len(self.keyframes) - 1, 0, 0.3
         loop.stage, loop.reason_text = types.loop_result_t.STAGE_ON_TRIAL, "accepted"
@@ -121,7 +140,7 @@ class Drive:
         """Puts every keyframe back on the line x = 0."""
         graph = types.smoothed_keyframes_t()
         graph.utime, graph.sequence, graph.revision = self.stamp(), revision, revision
-        graph.part_count, graph.full = 1, 1
+        graph.part_count, graph.full, graph.session = 1, 1, self.session
         graph.graph_keyframes = graph.num_keyframes = len(self.keyframes)
         graph.newest_id = len(self.keyframes) - 1
         graph.map_odom_position = [-self.keyframes[-1][0], 0.0, 0.0]

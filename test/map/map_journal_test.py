@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from ignis.pipeline import binary
-from map_drive import URL, Drive
+from map_drive import URL, Drive, forged_message
 from stream_server import Server
 
 STEPS = 130
@@ -50,6 +50,9 @@ class JournalledMap:
             self.drive.answer(0.05)
         return status
 
+    def wait_for_trouble(self) -> str:
+        return self.wait_for(lambda status: status.get("health", "OK") != "OK")["health"]
+
     def kill(self) -> None:
         self.server.process.kill()
         self.server.process.communicate()
@@ -71,6 +74,10 @@ class JournalledMap:
 
     def files(self) -> list[Path]:
         return sorted((self.folder / "journal").glob("map_keyframe_*"))
+
+
+def length_of_head(file: bytes) -> int:
+    return 8 + int.from_bytes(file[:4], "little")
 
 
 @pytest.fixture
@@ -154,11 +161,40 @@ def test_fault_m4_a_damaged_journal_gives_what_is_whole_and_says_so(make_map) ->
     run.start()
     run.drive_to(91)
     status = run.status()
+    assert "the map's journal is not whole: 3 files, among them map_keyframe_" in run.wait_for_trouble()
     assert status["keyframes"] == whole["keyframes"]
     assert 0.5 * sum(whole["voxels"]) < sum(status["voxels"]) <= sum(whole["voxels"]) + 500
     assert not (run.folder / "journal" / "map_keyframe_77").exists()
     _, said = run.end()
-    assert "not whole: map_keyframe_" in said
+    assert "not whole: 3 files, among them map_keyframe_" in said
+
+
+@pytest.mark.parametrize("place", ["head", "first record"])
+def test_fault_m4_a_keyframe_that_the_journal_lost_as_a_whole_is_told_in_health(make_map, place: str) -> None:
+    run = make_map()
+    run.drive_to(90)
+    keyframes = run.status()["keyframes"]
+    run.kill()
+    file = run.files()[2]
+    damaged = bytearray(file.read_bytes())
+    damaged[10 if place == "head" else length_of_head(damaged) + 20] ^= 0x10
+    file.write_bytes(damaged)
+    run.start()
+    run.drive_to(91)
+    assert f"the map's journal is not whole: {file.name}: " in run.wait_for_trouble()
+    assert run.status()["keyframes"] == keyframes - 1
+    assert f"not whole: {file.name}: " in run.end()[1]
+
+
+def test_a_forged_message_before_the_first_scan_costs_no_journal(make_map) -> None:
+    run = make_map()
+    run.drive_to(60)
+    run.kill()
+    run.start()
+    run.drive.bus.publish(*forged_message("SMOOTHED_KEYFRAMES"))
+    run.wait_for(lambda status: status.get("health") == "OK")
+    run.drive_to(61)
+    assert "goes on with" in run.end()[1]
 
 
 def test_a_journal_of_another_drive_is_not_gone_on_with(make_map) -> None:

@@ -111,6 +111,30 @@ TEST(MissedScans, ARestartedFrontEndHasNothingToAskFor) {
   EXPECT_EQ(missed.trouble(0.0), "scans that a restarted front end no longer has of the map's restart are missing");
 }
 
+TEST(MissedScans, SaysWhatItWaitsForWhileNothingEntersTheMap) {
+  MissedScans missed;
+  missed.begin(6, 9, 0.0);
+  missed.hold(cloud(9), 0.0);
+  EXPECT_EQ(missed.trouble(0.0), "waiting for 3 scans of the map's restart");
+  missed.hold(cloud(7), 0.1);
+  missed.hold(cloud(6), 0.1);
+  EXPECT_EQ(missed.trouble(0.1), "waiting for 1 scans of the map's restart");
+  missed.hold(cloud(8), 0.2);
+  ASSERT_EQ(text(missed.take(0.2)), "7 8 9");
+  EXPECT_EQ(missed.trouble(0.2), "");
+}
+
+TEST(MissedScans, AFrontEndThatRestartsMeanwhileEndsTheWaitAndLosesNothingOfItsOwn) {
+  MissedScans missed;
+  missed.begin(6, 9, 0.0);
+  missed.hold(cloud(9), 0.0);
+  EXPECT_EQ(text(missed.take(0.5)), "");
+  missed.hold(cloud(0), 0.5);
+  EXPECT_EQ(text(missed.take(0.5)), "9 0") << "it counts anew, and comes after all others";
+  EXPECT_FALSE(missed.waiting());
+  EXPECT_EQ(missed.trouble(0.5), "2 scans of the map's restart are missing");
+}
+
 TEST(MissedScans, HoldsABoundedNumberOfPoints) {
   MissedScans missed;
   missed.begin(0, 5, 0.0);

@@ -34,6 +34,26 @@ TEST(PartAssembler, CountsASequenceThatANewerOneReplaces) {
   EXPECT_EQ(assembler.incomplete(), 2);
 }
 
+TEST(PartAssembler, TakesAPartThatComesAgainBehindTheWholeForNoLoss) {
+  PartAssembler<Part> assembler;
+  EXPECT_FALSE(assembler.add({7, 0, 2}));
+  EXPECT_TRUE(assembler.add({7, 1, 2}));
+  EXPECT_FALSE(assembler.add({7, 1, 2}));
+  EXPECT_FALSE(assembler.add({8, 0, 2}));
+  EXPECT_FALSE(assembler.add({7, 0, 2})) << "nor does it end the wait for the next one";
+  EXPECT_TRUE(assembler.add({8, 1, 2}));
+  EXPECT_EQ(assembler.incomplete(), 0);
+}
+
+TEST(PartAssembler, HandsOverASequenceAgainThatIsSentAgainAsAWhole) {
+  PartAssembler<Part> assembler;
+  for (const std::int32_t sequence : {0, 1, 0, 0}) {
+    EXPECT_FALSE(assembler.add({sequence, 0, 2}));
+    EXPECT_TRUE(assembler.add({sequence, 1, 2})) << sequence;
+  }
+  EXPECT_EQ(assembler.incomplete(), 0);
+}
+
 TEST(PartAssembler, RefusesImpossibleNumbering) {
   PartAssembler<Part> assembler;
   EXPECT_FALSE(assembler.add({1, 0, 0}));

@@ -69,6 +69,22 @@ def test_records_are_put_in_the_order_in_which_they_were_complete(
     assert not list(tmp_path.glob("*.decoded")) and not list(tmp_path.glob("*.tmp"))
 
 
+def test_a_damaged_capture_is_imported_as_far_as_it_is_whole_and_called_so(
+    arguments: list[str], driver: Path, tmp_path: Path, capsys
+) -> None:
+    scan, sample = scan_t(), imu_t()
+    scan.part_count = 1
+    with LogWriter(tmp_path / "driver.log") as writer:
+        writer.write(77, "L1_SCAN", scan.encode())
+        writer.write(78, "L1_IMU", sample.encode())
+    play(driver, tmp_path / "driver.log")
+    with driver.open("a") as script:
+        script.write('echo "l1_driver: damage in the stream: 2 checksum errors" >&2\nexit 3\n')
+    assert main(arguments) == 0
+    assert "  damage in the stream: 2 checksum errors" in capsys.readouterr().out
+    assert (tmp_path / "x.lcmlog").is_file()
+
+
 def test_changes_of_the_configuration_reach_the_driver(
     arguments: list[str], driver: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:

@@ -16,11 +16,13 @@ test::Drive hall_drive() {
   return test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 16.0, test::Sensors{}, 7);
 }
 
+/// `given`: counts the scans that were begun, if anyone wants to know.
 ReplayResult replay(const test::Drive& drive, const runtime::IgnisConfig& config = {},
-                    GraphListener* listener = nullptr) {
+                    GraphListener* listener = nullptr, std::size_t* given = nullptr) {
   ReplayPipeline pipeline(config, true, listener);
   auto imu = drive.imu.begin();
   for (const Scan& scan : drive.scans) {
+    if (given != nullptr) ++*given;
     for (; imu != drive.imu.end() && imu->utime <= scan.end_utime(); ++imu) pipeline.add_imu(*imu);
     pipeline.add_scan(scan);
   }
@@ -53,7 +55,10 @@ TEST(ReplayPipeline, BeginsANewGraphWithTheFrontEndsNewSession) {
 /// Counts what the back end would publish.
 class Publications : public GraphListener {
  public:
-  void keyframe_sent(const keyframe_t& part) override { keyframes += part.part == 0 ? 1 : 0; }
+  void keyframe_sent(const keyframe_t& part) override {
+    keyframes += part.part == 0 ? 1 : 0;
+    newest = part.utime;
+  }
   void graph_changed(const Smoother& smoother, const SmootherUpdate& update, std::int32_t /*session*/,
                      Utime /*utime*/) override {
     ++changes;
@@ -63,6 +68,7 @@ class Publications : public GraphListener {
   }
 
   int keyframes = 0;
+  Utime newest = 0;  ///< [us] of the newest keyframe
   int changes = 0;
   int loops = 0;
   std::vector<int> swapped_at;  ///< keyframes in the graph when the batch optimum took its place
@@ -87,22 +93,39 @@ TEST(ReplayPipeline, TakesTheBatchOptimumOverWhereTheBackEndDoes) {
 
 class FailingListener : public GraphListener {
  public:
+  explicit FailingListener(std::int32_t at) : at_(at) {}
   void keyframe_sent(const keyframe_t& part) override {
-    if (part.id == 1) throw std::runtime_error("the second keyframe");
+    if (part.id == at_) throw std::runtime_error("the keyframe");
   }
   void graph_changed(const Smoother& /*smoother*/, const SmootherUpdate& /*update*/, std::int32_t /*session*/,
                      Utime /*utime*/) override {}
+
+ private:
+  std::int32_t at_;
 };
 
-TEST(ReplayPipeline, ThrowsAtTheEndWhatTheOtherThreadThrew) {
-  FailingListener listener;
+TEST(ReplayPipeline, ThrowsWhatTheOtherThreadThrewBeforeTheDriveEnds) {
+  FailingListener listener(1);
   const test::Drive drive = hall_drive();
+  std::size_t given = 0;
   try {
-    static_cast<void>(replay(drive, {}, &listener));
+    static_cast<void>(replay(drive, {}, &listener, &given));
     FAIL() << "nothing was thrown";
   } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "the second keyframe");
+    EXPECT_STREQ(error.what(), "the keyframe");
   }
+  EXPECT_LT(given, drive.scans.size()) << "the front end has worked for nothing";
+}
+
+TEST(ReplayPipeline, ThrowsAtTheEndWhatTheOtherThreadThrewLast) {
+  test::Drive drive = hall_drive();
+  Publications published;
+  static_cast<void>(replay(drive, {}, &published));
+  ASSERT_GE(published.keyframes, 2);
+  // Nothing follows the scan that the last keyframe is made of.
+  std::erase_if(drive.scans, [&](const Scan& scan) { return scan.end_utime() > published.newest; });
+  FailingListener listener(published.keyframes - 1);
+  EXPECT_THROW(static_cast<void>(replay(drive, {}, &listener)), std::runtime_error);
 }
 
 TEST(ReplayPipeline, HasOneSessionWhereTheMapHolds) {

@@ -49,6 +49,15 @@ def test_decode_of_a_damaged_stream_leaves_holes_and_says_so(run_binary, tmp_pat
     assert missing == {"252"}  # the twelfth
 
 
+@pytest.mark.parametrize(("stream", "code"), [("golden_clean.bin", 0), ("golden_faults.bin", 3)])
+def test_a_capture_that_is_played_says_whether_it_is_damaged(stream, code, run_binary, tmp_path: Path) -> None:
+    log = tmp_path / "played.lcmlog"
+    done = run_binary("l1_driver", "--capture", GOLDEN / stream, "--lcm-url", f"file://{log}?mode=w")
+    assert done.returncode == code, done.stderr
+    assert ("3 pairs and 1 inertial samples missing" in done.stderr) == (code == 3)
+    assert log.stat().st_size > 10_000
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "expected"),
     [

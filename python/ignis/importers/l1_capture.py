@@ -14,6 +14,7 @@ from ignis.mounts import set_options
 _MAGIC, _HEADER_BYTES, _FRAME_OVERHEAD = 0xFD, 10, 12
 _SENSOR_MESSAGES = (13, 16, 17, 18, 19)
 _PROBE_BYTES = 1 << 16
+_DAMAGED = 3  # the driver's exit code: the log holds what was sound
 
 
 def is_capture(head: bytes) -> bool:
@@ -40,10 +41,13 @@ def import_capture(path: Path, config: Path, output: Path, changes: Sequence[str
     command = [str(driver), "--capture", str(path), "--config", str(config), *set_options(changes)]
     try:
         run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-        if run.returncode != 0 or not decoded.is_file() or decoded.stat().st_size == 0:
+        if run.returncode not in (0, _DAMAGED) or not decoded.is_file() or decoded.stat().st_size == 0:
             reason = run.stderr.strip().removeprefix("l1_driver: ") or "the driver found nothing in it"
             raise InputError(f"cannot import {path}: {reason}")
-        return _write_in_order(decoded, output, path)
+        remarks = _write_in_order(decoded, output, path)
+        if run.returncode == _DAMAGED:
+            remarks.append(run.stderr.strip().removeprefix("l1_driver: "))
+        return remarks
     finally:
         decoded.unlink(missing_ok=True)
 

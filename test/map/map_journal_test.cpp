@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_builder/map_journal.h"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <fstream>
+#include <string>
+
+#include <sys/resource.h>
+
+#include "test_folder.h"
+
+namespace ignis {
+namespace {
+
+const std::string kConfig = "a configuration";
+
+MapRecord record(std::int32_t id, bool is_keyframe, std::size_t points = 10) {
+  MapRecord made;
+  made.id = id;
+  made.is_keyframe = is_keyframe;
+  made.points.resize(points);
+  return made;
+}
+
+/// Three keyframes with two scans each; returns their files.
+std::vector<std::filesystem::path> write_drive(const std::filesystem::path& folder) {
+  MapJournal journal(folder);
+  journal.begin({.config_fingerprint = kConfig});
+  std::vector<std::filesystem::path> files;
+  for (std::int32_t id = 0; id < 3; ++id) {
+    journal.append(record(id, true));
+    journal.append(record(id, false));
+    journal.append(record(id, false));
+    files.push_back(folder / ("map_keyframe_" + std::to_string(id)));
+  }
+  EXPECT_EQ(journal.failure(), "");
+  return files;
+}
+
+void flip(const std::filesystem::path& path, std::streamoff at) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekg(at);
+  const char byte = static_cast<char>(file.get() ^ 0x10);
+  file.seekp(at);
+  file.put(byte);
+}
+
+TEST(MapJournal, GivesBackWhatWasWritten) {
+  const std::filesystem::path folder = test::fresh_folder();
+  write_drive(folder);
+  MapJournal journal(folder);
+  const auto loaded = journal.load(kConfig);
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->records.size(), 9U);
+  EXPECT_EQ(journal.damage(), "");
+}
+
+TEST(MapJournal, NamesEveryFileWhereverAByteOfItIsAltered) {
+  const std::filesystem::path folder = test::fresh_folder();
+  const auto size = static_cast<std::streamoff>(std::filesystem::file_size(write_drive(folder)[1]));
+  for (std::streamoff at = 0; at < size; ++at) {
+    flip(write_drive(folder)[1], at);
+    MapJournal journal(folder);
+    const auto loaded = journal.load(kConfig);
+    ASSERT_TRUE(loaded) << "the other two are whole";
+    EXPECT_GE(loaded->records.size(), 6U);
+    EXPECT_LT(loaded->records.size(), 9U);
+    EXPECT_EQ(journal.damage().find("map_keyframe_1: "), 0U) << "byte " << at << ": " << journal.damage();
+  }
+}
+
+TEST(MapJournal, NamesDamageWhereNothingIsLeftToGoOnWith) {
+  const std::filesystem::path folder = test::fresh_folder();
+  for (const std::filesystem::path& file : write_drive(folder)) flip(file, 20);
+  MapJournal journal(folder);
+  EXPECT_FALSE(journal.load(kConfig));
+  EXPECT_NE(journal.damage().find("3 files"), std::string::npos) << journal.damage();
+}
+
+TEST(MapJournal, DoesNotCallItDamageThatAFileIsOfAnotherConfiguration) {
+  const std::filesystem::path folder = test::fresh_folder();
+  write_drive(folder);
+  MapJournal journal(folder);
+  EXPECT_FALSE(journal.load("another configuration"));
+  EXPECT_EQ(journal.damage(), "");
+}
+
+/// While it lives no file grows beyond so many bytes, as on a disk that is nearly full.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST(MapJournal, TellsALostRecordUntilItBeginsAnewThoughLaterOnesFit) {
+  const std::filesystem::path folder = test::fresh_folder();
+  MapJournal journal(folder);
+  journal.begin({.config_fingerprint = kConfig});
+  {
+    const FullDisk disk(2000);
+    journal.append(record(0, true, 1000));
+    journal.append(record(0, false, 10));
+  }
+  EXPECT_NE(journal.failure().find("cannot be written"), std::string::npos) << journal.failure();
+  EXPECT_NE(journal.failure().find("1 records are lost"), std::string::npos) << journal.failure();
+  journal.append(record(1, true, 10));
+  EXPECT_NE(journal.failure(), "") << "what was lost is lost still";
+  journal.begin({.config_fingerprint = kConfig, .session = 1});
+  EXPECT_EQ(journal.failure(), "");
+}
+
+}  // namespace
+}  // namespace ignis
