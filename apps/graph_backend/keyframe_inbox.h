@@ -17,7 +17,7 @@ class KeyframeInbox {
   using Time = std::chrono::steady_clock::time_point;
 
   void put(Keyframe keyframe, Time now);
-  void clear() { waiting_.clear(); }
+  void clear() { *this = {}; }
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
 
   /// The first one, when its id is at most `expected`.

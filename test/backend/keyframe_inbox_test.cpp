@@ -99,5 +99,18 @@ TEST(KeyframeInbox, ForgetsWhatItHoldsWhenCleared) {
   EXPECT_FALSE(inbox.take(1).has_value());
 }
 
+TEST(KeyframeInbox, ForgetsHowOftenItAskedWhenCleared) {
+  KeyframeInbox inbox;
+  inbox.put(numbered(4), kStart);
+  KeyframeInbox::Time now = kStart;
+  for (int i = 0; i < 41; ++i, now += milliseconds(300)) (void)inbox.ids_to_request(0, now);
+  ASSERT_TRUE(inbox.hopeless_before(0).has_value());
+  inbox.clear();
+  inbox.put(numbered(1), now);
+  EXPECT_FALSE(inbox.hopeless_before(0).has_value()) << "the new drive's first keyframe was overtaken, no more";
+  EXPECT_EQ(inbox.ids_to_request(0, now), Ids{0});
+  EXPECT_FALSE(inbox.hopeless_before(0).has_value());
+}
+
 }  // namespace
 }  // namespace ignis
