@@ -67,8 +67,13 @@ void BackendNode::on_keyframe_part(const keyframe_t& part) {
   if (keyframe->session != graph_.session() || graph_.smoother().is_of_another_drive(*keyframe)) {
     begin_session(keyframe->session);
   }
-  if (keyframe->id < graph_.smoother().expected_id()) return;  // a repeat that somebody else asked for
-  inbox_.put(std::move(*keyframe), std::chrono::steady_clock::now());
+  const std::int32_t id = keyframe->id;
+  const std::int32_t expected = graph_.smoother().expected_id();
+  if (id < expected) return;  // a repeat that somebody else asked for
+  if (!inbox_.put(std::move(*keyframe), expected, std::chrono::steady_clock::now())) {
+    refusal_ = std::format("keyframe {} put aside: {} comes next", id, expected);
+    ++keyframe_counts_->rejected;
+  }
   add_waiting_keyframes();
 }
 
