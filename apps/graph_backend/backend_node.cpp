@@ -194,8 +194,7 @@ void BackendNode::request_missing_keyframes() {
   if (graph_.session() < 0) return;
   const std::int32_t expected = graph_.smoother().expected_id();
   if (const std::optional<std::int32_t> hopeless = inbox_.hopeless_before(expected)) {
-    graph_.accept_gap_before(*hopeless);
-    add_waiting_keyframes();
+    give_up_before(*hopeless);
     return;
   }
   keyframe_request_t request{};
@@ -209,10 +208,20 @@ void BackendNode::request_missing_keyframes() {
   link_.publish(channels::kKeyframeRequest, request);
 }
 
+void BackendNode::give_up_before(std::int32_t id) {
+  const std::int32_t expected = graph_.smoother().expected_id();
+  std::cerr << std::format("graph_backend: keyframes {} to {} are given up: nobody sends them again", expected, id - 1)
+            << std::endl;
+  keyframes_given_up_ += std::int64_t{id} - expected;
+  graph_.accept_gap_before(id);
+  add_waiting_keyframes();
+}
+
 void BackendNode::publish_health() {
-  keyframe_counts_->queue_drops = assembler_.incomplete();
+  keyframe_counts_->queue_drops = assembler_.incomplete() + inbox_.dropped() + keyframes_given_up_;
   const SmootherStats stats = graph_.smoother().stats();
   const bool cloud_was_lost = cloud_losses_.look(stats.clouds_unreadable, std::chrono::steady_clock::now());
+  const bool keyframe_was_lost = keyframe_losses_.look(keyframes_given_up_, std::chrono::steady_clock::now());
   if (!stats.solver_failure.empty()) {
     link_.report_health(
         newest_utime_, health_t::FAULT,
@@ -225,6 +234,9 @@ void BackendNode::publish_health() {
   } else if (!inbox_.empty()) {
     link_.report_health(newest_utime_, health_t::DEGRADED,
                         std::format("waiting for keyframe {}", graph_.smoother().expected_id()));
+  } else if (keyframe_was_lost) {
+    link_.report_health(newest_utime_, health_t::DEGRADED,
+                        std::format("{} keyframes are given up; the graph has holes there", keyframes_given_up_));
   } else if (stats.clouds_unreadable > 0) {
     link_.report_health(newest_utime_, cloud_was_lost ? health_t::DEGRADED : health_t::OK,
                         std::format("{}{} times the journal did not give a cloud back, and a loop was refused for it",

@@ -35,6 +35,7 @@ class BackendNode {
   [[nodiscard]] bool is_next_state(const NavState& state);
   void begin_session(std::int32_t session);
   void request_missing_keyframes();
+  void give_up_before(std::int32_t id);
   void adopt_due_optimum();
   void begin_due_optimum();
   void publish_update(const SmootherUpdate& update);
@@ -60,6 +61,8 @@ class BackendNode {
   std::chrono::steady_clock::time_point last_full_{};
   SmootherUpdate last_update_;
   runtime::RecentRise cloud_losses_{std::chrono::seconds(60)};
+  std::int64_t keyframes_given_up_ = 0;
+  runtime::RecentRise keyframe_losses_{std::chrono::seconds(60)};
   std::string refusal_;  // of the newest keyframe; empty when it was accepted
   std::int32_t revision_sequence_ = 0;
   std::int32_t loop_sequence_ = 0;

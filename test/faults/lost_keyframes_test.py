@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Row B5: keyframes whose number is damaged, at the real back end."""
+"""Rows B1 and B5: keyframes that nobody sends again, and one whose number is damaged, at the real back end."""
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import ignis_lcm.ignis as types
 from fault_drive import FaultRun
 from hostile_messages import LARGEST, sample
 
-OK = 0
+OK, DEGRADED = 0, 1
 
 
 def keyframe(id_: int) -> Any:
@@ -24,6 +25,25 @@ def keyframe(id_: int) -> Any:
 def newest(run: FaultRun) -> Any:
     """What the back end has told last."""
     return run.seen.health["graph_backend"][-1]
+
+
+def test_fault_b1_keyframes_that_nobody_sends_again_are_given_up_and_told(private_network, tmp_path: Path) -> None:
+    with FaultRun(tmp_path, ("graph_backend",)) as run:
+        run.send("LIO_KEYFRAME", keyframe(3).encode())
+        deadline = time.monotonic() + 60.0
+        while not run.seen.poses:
+            assert time.monotonic() < deadline, newest(run).state_text
+            run.listen(0.5)
+        run.listen(1.5)
+        told = newest(run)
+        assert told.state == DEGRADED
+        assert "3 keyframes are given up" in told.state_text
+        assert told.queue_drops[told.channels.index("LIO_KEYFRAME")] == 3
+        run.send("LIO_KEYFRAME", keyframe(4).encode())
+        run.listen(1.5)
+        assert "3 keyframes are given up" in newest(run).state_text, "the next one does not hide it"
+        said = run.pipeline.last_words("graph_backend")
+    assert "keyframes 0 to 2 are given up: nobody sends them again" in said
 
 
 def test_fault_b5_a_keyframe_with_a_damaged_number_leaves_no_gap_to_wait_for(private_network, tmp_path: Path) -> None:
