@@ -3,8 +3,10 @@
 
 #include <format>
 #include <iostream>
+#include <utility>
 
 #include "backend/keyframe_check.h"
+#include "command_check.h"
 #include "ignis/graph_command_t.hpp"
 #include "messages/graph_revision.h"
 #include "runtime/channels.h"
@@ -20,19 +22,23 @@ constexpr int kCommandQueue = 100;
 constexpr Utime kSmoothedStatePeriod = 20'000;  // [us]
 constexpr std::chrono::seconds kFullPeriod{2};  // late joiners get the whole set within this time
 
+LoopResult answer_to(const graph_command_t& command, std::string text) {
+  LoopResult answer;
+  answer.from_id = command.from_id;
+  answer.to_id = command.to_id;
+  answer.reason_text = std::move(text);
+  return answer;
+}
+
 /// A command that changes nothing is answered too.
 SmootherUpdate answered(SmootherUpdate update, const graph_command_t& command) {
   const auto is_about_it = [&](const LoopResult& loop) {
     return loop.from_id == command.from_id && loop.to_id == command.to_id;
   };
   if (update.loop || std::ranges::any_of(update.changed, is_about_it)) return update;
-  LoopResult answer;
-  answer.utime = update.newest.utime;
-  answer.from_id = command.from_id;
-  answer.to_id = command.to_id;
-  answer.reason_text = command.command == graph_command_t::VETO_LOOP ? "vetoed; there was no such loop"
-                                                                     : "there is no such loop to withdraw";
-  update.loop = answer;
+  update.loop = answer_to(command, command.command == graph_command_t::VETO_LOOP ? "vetoed; there was no such loop"
+                                                                                 : "there is no such loop to withdraw");
+  update.loop->utime = update.newest.utime;
   return update;
 }
 
@@ -47,7 +53,7 @@ BackendNode::BackendNode(const runtime::Application& application, const std::fil
   state_counts_ = &link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,
                                             [this](const state_t& message) { on_state(message); });
   link_.subscribe<graph_command_t>(
-      channels::kGraphCommand, kCommandQueue, [this](const graph_command_t& command) { on_command(command); },
+      channels::kGraphCommand, kCommandQueue, [this](const graph_command_t& command) { return on_command(command); },
       runtime::Senders::kSeveral);
 }
 
@@ -108,17 +114,26 @@ void BackendNode::add_waiting_keyframes() {
   }
 }
 
-void BackendNode::on_command(const graph_command_t& command) {
-  if (command.session != -1 && command.session != graph_.session()) return;
+/// Why it is refused, or "". Whatever is carried out is written to the journal and told to everybody.
+const char* BackendNode::on_command(const graph_command_t& command) {
+  if (command.session != -1 && command.session != graph_.session()) return "";
+  if (!is_known(command)) return "there is no such command";
+  if (!commands_.allow(std::chrono::steady_clock::now())) return "too many commands";
   if (command.command == graph_command_t::SEND_FULL_SET) {
     publish_full_set();
-    return;
+    return "";
+  }
+  if (!names_keyframes_of(graph_.smoother().all_poses(), command)) {
+    constexpr const char* kUnknown = "the graph does not hold these two keyframes";
+    publish_loop(answer_to(command, kUnknown));
+    return kUnknown;
   }
   const SmootherUpdate update = graph_.change([&](Smoother& smoother) {
     return command.command == graph_command_t::VETO_LOOP ? smoother.veto_loop(command.from_id, command.to_id)
                                                          : smoother.withdraw_loop(command.from_id, command.to_id);
   });
   publish_update(answered(update, command));
+  return "";
 }
 
 void BackendNode::adopt_due_optimum() {

@@ -13,6 +13,7 @@
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
 #include "runtime/lcm_link.h"
+#include "runtime/rate_limit.h"
 #include "runtime/recent_rise.h"
 
 namespace ignis {
@@ -29,7 +30,7 @@ class BackendNode {
  private:
   void on_keyframe_part(const keyframe_t& part);
   void on_state(const state_t& message);
-  void on_command(const graph_command_t& command);
+  [[nodiscard]] const char* on_command(const graph_command_t& command);
   void add_waiting_keyframes();
   [[nodiscard]] bool refuse_damaged(const Keyframe& keyframe);
   [[nodiscard]] bool is_next_state(const NavState& state);
@@ -51,6 +52,7 @@ class BackendNode {
   messages::KeyframeAssembler assembler_;
   LastingGraph graph_;
   KeyframeInbox inbox_;
+  RateLimit commands_{10.0, 50.0};  // a person, or a script that vetoes what it has found
   ShadowSchedule schedule_;
   std::future<ShadowOptimum> optimum_;  // waits in its destructor, and when it is replaced, for the solve under way
   Pose T_map_odom_;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <lcm/lcm-cpp.hpp>
@@ -52,9 +53,10 @@ class LcmLink {
     if (lcm_.publish(channel, &message) != 0) ++failed_sends_;
   }
 
-  /// Calls `handler` with each well-formed message. The counts stay valid as long as the link.
-  template <class Message>
-  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity, std::function<void(const Message&)> handler,
+  /// Calls `handler` with each well-formed message. It may return why it refuses one, for HEALTH and the log: a string
+  /// literal, empty when it does not. The counts stay valid as long as the link.
+  template <class Message, class Handler>
+  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity, Handler handler,
                             Senders senders = Senders::kOne) {
     Receiver& receiver = receivers_.emplace_back();
     receiver.counts.channel = channel;
@@ -68,8 +70,12 @@ class LcmLink {
       }
       ++receiver.counts.received;
       if (senders == Senders::kOne) receiver.counts.lost += receiver.sequence.observe(message.sequence);
-      handler(message);
-      return "";
+      if constexpr (std::is_void_v<std::invoke_result_t<const Handler&, const Message&>>) {
+        handler(message);
+        return "";
+      } else {
+        return handler(message);
+      }
     };
     subscribe_raw(receiver, queue_capacity);
     return receiver.counts;
