@@ -112,11 +112,12 @@ void LcmLink::watch_peers() {
   subscribe<health_t>(
       channels::kHealth, kHealthQueue,
       [this](const health_t& message) {
-        peers_.observe({.process = message.process,
-                        .pid = message.pid,
-                        .version = message.version,
-                        .config_hash = message.config_hash},
-                       uptime_s(), message.uptime_s);
+        const bool taken = peers_.observe({.process = message.process,
+                                           .pid = message.pid,
+                                           .version = message.version,
+                                           .config_hash = message.config_hash},
+                                          uptime_s(), message.uptime_s);
+        return taken ? "" : "its uptime is impossible";
       },
       Senders::kSeveral);
   // After the subscription: BusSocket takes every socket on the bus's port for LCM's.

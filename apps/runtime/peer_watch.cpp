@@ -2,6 +2,7 @@
 #include "runtime/peer_watch.h"
 
 #include <algorithm>
+#include <cmath>
 #include <format>
 #include <iterator>
 
@@ -12,11 +13,12 @@ constexpr std::size_t kMaxTextLength = 64;  // our names, versions and fingerpri
 
 }  // namespace
 
-void PeerWatch::observe(const PeerIdentity& peer, double now_s, double uptime_s) {
-  if (peer.process == self_.process && peer.pid == self_.pid) return;
+bool PeerWatch::observe(const PeerIdentity& peer, double now_s, double uptime_s) {
+  if (peer.process == self_.process && peer.pid == self_.pid) return true;
+  if (!std::isfinite(uptime_s) || uptime_s < 0.0) return false;
   std::erase_if(peers_, [&](const auto& entry) { return now_s - entry.second.last_s > kForgetAfter_s; });
   const std::pair key{peer.process.substr(0, kMaxTextLength), peer.pid};
-  if (peers_.size() >= kMaxPeers && !peers_.contains(key)) return;
+  if (peers_.size() >= kMaxPeers && !peers_.contains(key)) return true;
   Heard& heard = peers_[key];
   heard.peer = {.process = key.first,
                 .pid = peer.pid,
@@ -29,6 +31,8 @@ void PeerWatch::observe(const PeerIdentity& peer, double now_s, double uptime_s)
   heard.last_s = now_s;
   ++heard.messages;
   note_start(key.first, peer.pid, now_s);
+  judge_latecomers(key.first, now_s);
+  return true;
 }
 
 void PeerWatch::note_start(const std::string& process, std::int32_t pid, double now_s) {
@@ -78,11 +82,32 @@ std::vector<std::pair<const PeerWatch::Heard*, const PeerWatch::Heard*>> PeerWat
   return found;
 }
 
+/// Whether one of this name is still heard that is no latecomer.
+bool PeerWatch::has_right_one(const std::string& process, double now_s) const {
+  return std::ranges::any_of(peers_, [&](const auto& entry) {
+    const Heard& heard = entry.second;
+    return heard.peer.process == process && !heard.is_late && now_s - heard.last_s <= kForgetAfter_s;
+  });
+}
+
+void PeerWatch::judge_latecomers(const std::string& process, double now_s) {
+  if (!has_right_one(process, now_s)) {
+    for (auto& [key, heard] : peers_) {
+      if (key.first == process) heard.is_late = false;
+    }
+  }
+  for (const auto& [a, b] : twins(now_s)) {
+    if (a->peer.process != process || a->is_late || b->is_late) continue;
+    const PeerIdentity& later = a->started_s <= b->started_s ? b->peer : a->peer;
+    peers_.at({process, later.pid}).is_late = true;
+  }
+}
+
 std::vector<PeerIdentity> PeerWatch::latecomers(double now_s) const {
   std::vector<PeerIdentity> late;
-  for (const auto& [a, b] : twins(now_s)) {
-    const PeerIdentity& later = a->started_s <= b->started_s ? b->peer : a->peer;
-    if (!std::ranges::contains(late, later)) late.push_back(later);
+  for (const auto& [key, heard] : peers_) {
+    const bool is_heard = now_s - heard.last_s <= kForgetAfter_s;
+    if (heard.is_late && is_heard && has_right_one(key.first, now_s)) late.push_back(heard.peer);
   }
   return late;
 }

@@ -43,14 +43,15 @@ class PeerWatch {
   explicit PeerWatch(PeerIdentity self) : self_(std::move(self)) {}
 
   /// A HEALTH message arrived at `now_s` [s of any steady clock] from a process that has lived for `uptime_s` [s]. Our
-  /// own are ignored.
-  void observe(const PeerIdentity& peer, double now_s, double uptime_s);
+  /// own are ignored. False when that time is impossible: then it says nothing.
+  bool observe(const PeerIdentity& peer, double now_s, double uptime_s);
 
   /// What disagrees among those heard lately, in words; empty when all agree.
   [[nodiscard]] std::string trouble(double now_s) const;
 
   /// Of executables that are there more than once: all but the one that has lived longest. That is the one that the
-  /// vehicle has gone by so far, and every process on the bus comes to the same answer.
+  /// vehicle has gone by so far, and every process that has heard both comes to the same answer. A latecomer stays one
+  /// as long as another is there: when the right one is started anew, the vehicle goes on with that.
   [[nodiscard]] std::vector<PeerIdentity> latecomers(double now_s) const;
 
   /// Whether anything of that needs a person: every disagreement does, since no process can mend it.
@@ -63,6 +64,7 @@ class PeerWatch {
     double first_s = 0.0;
     double last_s = 0.0;
     int messages = 0;
+    bool is_late = false;
   };
   struct Start {
     std::int32_t pid = 0;
@@ -71,6 +73,8 @@ class PeerWatch {
   [[nodiscard]] std::string disagreement(const Heard& heard) const;
   [[nodiscard]] bool are_twins(const Heard& a, const Heard& b, double now_s) const;
   [[nodiscard]] std::vector<std::pair<const Heard*, const Heard*>> twins(double now_s) const;
+  [[nodiscard]] bool has_right_one(const std::string& process, double now_s) const;
+  void judge_latecomers(const std::string& process, double now_s);
   void note_start(const std::string& process, std::int32_t pid, double now_s);
 
   PeerIdentity self_;

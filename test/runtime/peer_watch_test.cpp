@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/peer_watch.h"
 
+#include <cmath>
+#include <functional>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -102,6 +105,69 @@ TEST(Fault_B7, AllButTheOneThatHasLivedLongestAreLatecomers) {
   }
   EXPECT_EQ(watch.latecomers(3.1), (std::vector{peer("l1_driver", 100), peer("l1_driver", 300)}));
   EXPECT_TRUE(watch.latecomers(3.1 + PeerWatch::kForgetAfter_s).empty());
+}
+
+/// HEALTH of drivers, by process id when they were started and when they end, heard once a second from `from_s` on.
+struct Lives {
+  std::map<int, std::pair<double, double>> lives;
+
+  void tell(PeerWatch& watch, double from_s, double to_s, const std::function<void(double)>& look) const {
+    for (double now_s = from_s; now_s <= to_s; now_s += 0.5) {
+      for (const auto& [pid, life] : lives) {
+        const double lived_s = now_s - life.first;
+        if (lived_s >= 0.0 && now_s < life.second) watch.observe(peer("l1_driver", pid), now_s, lived_s);
+      }
+      look(now_s);
+    }
+  }
+};
+
+TEST(Fault_B7, AVehicleWhoseDriverIsStartedAnewGoesOnWithItAndNotWithTheLatecomer) {
+  PeerWatch watch(kSelf);
+  // 100 is ours, 200 came later; 100 dies and is followed by 300 a tenth of a second later.
+  const Lives drivers{{{100, {-60.0, 10.0}}, {200, {-5.0, 1e9}}, {300, {10.1, 1e9}}}};
+  drivers.tell(watch, 0.0, 30.0, [&](double now_s) {
+    if (now_s < 2.0) return;
+    EXPECT_EQ(watch.latecomers(now_s), std::vector{peer("l1_driver", 200)}) << now_s;
+  });
+}
+
+TEST(Fault_B7, ALatecomerThatIsAloneIsNone) {
+  PeerWatch watch(kSelf);
+  const Lives drivers{{{100, {-60.0, 10.0}}, {200, {-5.0, 1e9}}, {300, {20.0, 1e9}}}};
+  drivers.tell(watch, 0.0, 40.0, [&](double now_s) {
+    if (now_s > 13.0 && now_s < 21.0) {
+      EXPECT_TRUE(watch.latecomers(now_s).empty()) << now_s;
+    }
+    if (now_s > 22.0) {
+      EXPECT_EQ(watch.latecomers(now_s), std::vector{peer("l1_driver", 300)}) << now_s;
+    }
+  });
+}
+
+TEST(Fault_B7, OfTwoLatecomersTheOneThatHasLivedLongerGoesOnWhenTheRightOneIsGone) {
+  PeerWatch watch(kSelf);
+  const Lives drivers{{{100, {-60.0, 10.0}}, {200, {-5.0, 1e9}}, {300, {-9.0, 1e9}}}};
+  drivers.tell(watch, 0.0, 30.0, [&](double now_s) {
+    if (now_s > 2.0 && now_s < 10.0) {
+      EXPECT_EQ(watch.latecomers(now_s), (std::vector{peer("l1_driver", 200), peer("l1_driver", 300)})) << now_s;
+    }
+    if (now_s > 13.5) {
+      EXPECT_EQ(watch.latecomers(now_s), std::vector{peer("l1_driver", 200)}) << now_s;
+    }
+  });
+}
+
+TEST(Fault_B7, AnUptimeThatIsImpossibleIsRefused) {
+  PeerWatch watch(kSelf);
+  for (const double uptime_s : {std::nan(""), HUGE_VAL, -HUGE_VAL, -0.001}) {
+    EXPECT_FALSE(watch.observe(peer("l1_driver", 7), 1.0, uptime_s)) << uptime_s;
+  }
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(watch.observe(peer("l1_driver", 8), i, i));
+    (void)watch.observe(peer("l1_driver", 7), i, std::nan(""));
+  }
+  EXPECT_EQ(watch.trouble(2.1), "");
 }
 
 TEST(Fault_B7, AThirdThatHasJustEndedDoesNotHideTheOtherTwo) {
