@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <deque>
@@ -112,6 +113,8 @@ class LcmLink {
   void take(std::span<const std::byte> data, Receiver& receiver);
   void refuse(Receiver& receiver, const std::string& reason, bool is_foreign);
   void watch_peers();
+  void observe_peer(const health_t& message, const UdpAddress& sender);
+  void hear_peers();
   void ignore_latecomers();
   void sample_budget();
   void publish_health(health_t& message);
@@ -137,6 +140,8 @@ class LcmLink {
   bool watching_peers_ = false;
   std::optional<SenderAddresses> addresses_;
   std::vector<PeerIdentity> ignored_;
+  std::array<double, 256> own_uptimes_s_{};  // in our newest HEALTH messages: by them we know our own
+  double last_hearing_s_ = -1.0;
   double last_look_s_ = -1.0;
   double last_sample_s_ = -1.0;
   std::int64_t progress_ = 0;

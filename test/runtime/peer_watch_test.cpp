@@ -158,16 +158,40 @@ TEST(Fault_B7, OfTwoLatecomersTheOneThatHasLivedLongerGoesOnWhenTheRightOneIsGon
   });
 }
 
-TEST(Fault_B7, AnUptimeThatIsImpossibleIsRefused) {
-  PeerWatch watch(kSelf);
+TEST(Fault_B7, AnUptimeThatIsImpossibleSaysNothing) {
+  EXPECT_TRUE(PeerWatch::is_possible(0.0));
   for (const double uptime_s : {std::nan(""), HUGE_VAL, -HUGE_VAL, -0.001}) {
-    EXPECT_FALSE(watch.observe(peer("l1_driver", 7), 1.0, uptime_s)) << uptime_s;
+    EXPECT_FALSE(PeerWatch::is_possible(uptime_s)) << uptime_s;
+    PeerWatch watch(kSelf);
+    for (int i = 0; i < 3; ++i) {
+      watch.observe(peer("l1_driver", 8), i, i);
+      watch.observe(peer("l1_driver", 7), i, uptime_s);
+    }
+    EXPECT_EQ(watch.trouble(2.1), "") << uptime_s;
   }
-  for (int i = 0; i < 3; ++i) {
-    EXPECT_TRUE(watch.observe(peer("l1_driver", 8), i, i));
-    (void)watch.observe(peer("l1_driver", 7), i, std::nan(""));
+}
+
+TEST(Fault_B7, TwoInstancesThatHaveTheSameProcessIdAreTwo) {
+  PeerWatch watch(kSelf);
+  PeerIdentity near = peer("l1_driver", 7);
+  PeerIdentity far = near;
+  near.sender = {.ip = 0x0A000001, .port = 4000};
+  far.sender = {.ip = 0x0A000002, .port = 4000};
+  for (int i = 0; i < 4; ++i) {
+    watch.observe(near, i, 60.0 + i);
+    watch.observe(far, i, 5.0 + i);
   }
-  EXPECT_EQ(watch.trouble(2.1), "");
+  EXPECT_EQ(watch.trouble(3.1),
+            "two instances of l1_driver are on the bus (processes 7 at 10.0.0.1:4000 and 10.0.0.2:4000)");
+  EXPECT_EQ(watch.latecomers(3.1), std::vector{far});
+}
+
+TEST(Fault_B7, ASecondInstanceThatHasOurProcessIdIsNoneOfOurs) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = kSelf;
+  other.sender = {.ip = 0x0A000002, .port = 4000};
+  for (int i = 0; i < 3; ++i) watch.observe(other, i, i);
+  EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 10)");
 }
 
 TEST(Fault_B7, AThirdThatHasJustEndedDoesNotHideTheOtherTwo) {
