@@ -69,11 +69,12 @@ void Lio::reset() {
   filter_ = FilterState();
   live_ = NavState();
   velocity_known_ = false;
+  mapped_velocity_variance_ = 0.0;
   applied_scans_ = 0;
   contradictions_ = 0;
   scans_without_correction_ = 0;
   trust_ = TrustMonitor(config_);
-  opinion_.forget();
+  opinion_ = SecondOpinion(config_);
   last_clipped_.reset();
   last_standstill_.reset();
   resumed_from_.reset();
