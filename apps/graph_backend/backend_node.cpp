@@ -96,6 +96,7 @@ bool BackendNode::refuse_damaged(const Keyframe& keyframe) {
 void BackendNode::begin_session(std::int32_t session) {
   graph_.begin_session(session);
   schedule_ = {};
+  optimum_.drop();
   inbox_.clear();
   T_map_odom_ = Pose{};
   last_update_ = {};
@@ -139,7 +140,7 @@ const char* BackendNode::on_command(const graph_command_t& command) {
 void BackendNode::adopt_due_optimum() {
   if (!schedule_.adoption_due(graph_.smoother().stats().keyframes)) return;
   schedule_.end();
-  const ShadowOptimum optimum = optimum_.get();
+  const ShadowOptimum optimum = optimum_.take();
   const int swaps = graph_.smoother().stats().shadow_swaps;
   const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(optimum); });
   if (graph_.smoother().stats().shadow_swaps != swaps) publish_update(update);
@@ -150,7 +151,7 @@ void BackendNode::adopt_due_optimum() {
 void BackendNode::begin_due_optimum() {
   if (!schedule_.begin_due()) return;
   schedule_.begin(graph_.smoother().stats().keyframes);
-  optimum_ = std::async(std::launch::async, solve, graph_.shadow_problem());
+  optimum_.begin(graph_.shadow_problem());
 }
 
 void BackendNode::publish_update(const SmootherUpdate& update) {

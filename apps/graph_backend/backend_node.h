@@ -2,10 +2,10 @@
 #pragma once
 
 #include <filesystem>
-#include <future>
 #include <optional>
 
 #include "backend/shadow_schedule.h"
+#include "background_solve.h"
 #include "common/leap_guard.h"
 #include "keyframe_inbox.h"
 #include "lasting_graph.h"
@@ -54,7 +54,7 @@ class BackendNode {
   KeyframeInbox inbox_;
   RateLimit commands_{10.0, 50.0};  // a person, or a script that vetoes what it has found
   ShadowSchedule schedule_;
-  std::future<ShadowOptimum> optimum_;  // waits in its destructor, and when it is replaced, for the solve under way
+  BackgroundSolve optimum_;
   Pose T_map_odom_;
   Utime newest_utime_ = 0;
   std::optional<Utime> newest_state_;  // [us] of LIO_STATE
