@@ -160,6 +160,16 @@ void explain_waiting(const Hearing& hearing, SmootherState& state, LoopEvents& e
   }
 }
 
+/// Several at once where loops in the graph were outvoted.
+void forget_oldest_waiting(SmootherState& state, LoopEvents& events) {
+  while (state.waiting.size() > kMostWaiting) {
+    GraphLoop& forgotten = events.emplace_back(std::move(state.waiting.front()));
+    state.waiting.erase(state.waiting.begin());
+    forgotten.result.stage = LoopStage::kWithdrawn;
+    forgotten.result.reason_text = std::format("forgotten: more than {} loops wait", kMostWaiting);
+  }
+}
+
 void enter_believed(const Hearing& hearing, const BackendConfig& config, IncrementalSolver& solver,
                     SmootherState& state, LoopEvents& events) {
   const auto deserves = [&](const GraphLoop& loop) {
@@ -182,7 +192,7 @@ void enter_believed(const Hearing& hearing, const BackendConfig& config, Increme
     withdraw_contradicted(entry.rise, config, solver, state, events);
   }
   explain_waiting(hearing, state, events);
-  if (state.waiting.size() > kMostWaiting) state.waiting.erase(state.waiting.begin());
+  forget_oldest_waiting(state, events);
 }
 
 }  // namespace

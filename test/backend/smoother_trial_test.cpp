@@ -202,6 +202,23 @@ TEST(LoopTrial, AVetoOfNumbersThatNoGraphHoldsForbidsNothing) {
   EXPECT_FALSE(is_vetoed(vetoes, 0, 2, 2));
 }
 
+TEST(LoopTrial, OfMoreThanAHundredThatWaitTheOldestIsForgottenAndSaysSo) {
+  BackendConfig config = without_search();
+  config.loop_support_beyond_m = 0.5;
+  config.loop_support_apart_m = 10.0;
+  VagueDrive run(config);
+  ASSERT_EQ(run.add_loop(25, 3, 0.0).loop->reason, LoopReason::kNeedsSupport);
+  for (int i = 1; i < 100; ++i) EXPECT_TRUE(run.add_loop(24, 2, 0.0).changed.empty()) << i;
+  const SmootherUpdate update = run.add_loop(24, 2, 0.0);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 100);
+  ASSERT_EQ(update.changed.size(), 1U);
+  EXPECT_EQ(update.changed[0].from_id, 25);
+  EXPECT_EQ(update.changed[0].stage, LoopStage::kWithdrawn);
+  EXPECT_EQ(update.changed[0].reason, LoopReason::kNeedsSupport);
+  EXPECT_EQ(update.changed[0].reason_text, "forgotten: more than 100 loops wait");
+  EXPECT_EQ(update.loop->stage, LoopStage::kVerified);
+}
+
 TEST(LoopSearch, LeavesVetoedNeighbourhoodsAlone) {
   const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 24, .cloud_points = 3000});
   Smoother free{BackendConfig(), LoopGates()};
