@@ -178,16 +178,16 @@ void enter_believed(const Hearing& hearing, const BackendConfig& config, Increme
   // One that enters may support those that waited before it.
   for (auto next = std::ranges::find_if(state.waiting, deserves); next != state.waiting.end();
        next = std::ranges::find_if(state.waiting, deserves)) {
-    const GraphLoop copy = std::move(*next);
+    GraphLoop entering = std::move(*next);
     state.waiting.erase(next);
-    const LoopEntry entry = enter_graph(copy, config, solver, state);
+    const LoopEntry entry = enter_graph(entering, config, solver, state);
     if (!entry.entered) {
-      events.push_back(copy);
+      events.push_back(std::move(entering));
       events.back().result.reason = LoopReason::kSolverRefused;
       events.back().result.reason_text = entry.refusal;
       continue;
     }
-    state.last_loop_id = std::max(state.last_loop_id, copy.result.from_id);
+    state.last_loop_id = std::max(state.last_loop_id, entering.result.from_id);
     events.push_back(state.loops.back());
     withdraw_contradicted(entry.rise, config, solver, state, events);
   }
