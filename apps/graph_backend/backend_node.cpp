@@ -3,8 +3,10 @@
 
 #include <format>
 #include <iostream>
+#include <utility>
 
 #include "backend/keyframe_check.h"
+#include "command_check.h"
 #include "ignis/graph_command_t.hpp"
 #include "messages/graph_revision.h"
 #include "runtime/channels.h"
@@ -20,19 +22,23 @@ constexpr int kCommandQueue = 100;
 constexpr Utime kSmoothedStatePeriod = 20'000;  // [us]
 constexpr std::chrono::seconds kFullPeriod{2};  // late joiners get the whole set within this time
 
+LoopResult answer_to(const graph_command_t& command, std::string text) {
+  LoopResult answer;
+  answer.from_id = command.from_id;
+  answer.to_id = command.to_id;
+  answer.reason_text = std::move(text);
+  return answer;
+}
+
 /// A command that changes nothing is answered too.
 SmootherUpdate answered(SmootherUpdate update, const graph_command_t& command) {
   const auto is_about_it = [&](const LoopResult& loop) {
     return loop.from_id == command.from_id && loop.to_id == command.to_id;
   };
   if (update.loop || std::ranges::any_of(update.changed, is_about_it)) return update;
-  LoopResult answer;
-  answer.utime = update.newest.utime;
-  answer.from_id = command.from_id;
-  answer.to_id = command.to_id;
-  answer.reason_text = command.command == graph_command_t::VETO_LOOP ? "vetoed; there was no such loop"
-                                                                     : "there is no such loop to withdraw";
-  update.loop = answer;
+  update.loop = answer_to(command, command.command == graph_command_t::VETO_LOOP ? "vetoed; there was no such loop"
+                                                                                 : "there is no such loop to withdraw");
+  update.loop->utime = update.newest.utime;
   return update;
 }
 
@@ -47,7 +53,7 @@ BackendNode::BackendNode(const runtime::Application& application, const std::fil
   state_counts_ = &link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,
                                             [this](const state_t& message) { on_state(message); });
   link_.subscribe<graph_command_t>(
-      channels::kGraphCommand, kCommandQueue, [this](const graph_command_t& command) { on_command(command); },
+      channels::kGraphCommand, kCommandQueue, [this](const graph_command_t& command) { return on_command(command); },
       runtime::Senders::kSeveral);
 }
 
@@ -67,8 +73,13 @@ void BackendNode::on_keyframe_part(const keyframe_t& part) {
   if (keyframe->session != graph_.session() || graph_.smoother().is_of_another_drive(*keyframe)) {
     begin_session(keyframe->session);
   }
-  if (keyframe->id < graph_.smoother().expected_id()) return;  // a repeat that somebody else asked for
-  inbox_.put(std::move(*keyframe), std::chrono::steady_clock::now());
+  const std::int32_t id = keyframe->id;
+  const std::int32_t expected = graph_.smoother().expected_id();
+  if (id < expected) return;  // a repeat that somebody else asked for
+  if (!inbox_.put(std::move(*keyframe), expected, std::chrono::steady_clock::now())) {
+    refusal_ = std::format("keyframe {} put aside: {} comes next", id, expected);
+    ++keyframe_counts_->rejected;
+  }
   add_waiting_keyframes();
 }
 
@@ -85,6 +96,7 @@ bool BackendNode::refuse_damaged(const Keyframe& keyframe) {
 void BackendNode::begin_session(std::int32_t session) {
   graph_.begin_session(session);
   schedule_ = {};
+  optimum_.drop();
   inbox_.clear();
   T_map_odom_ = Pose{};
   last_update_ = {};
@@ -103,23 +115,32 @@ void BackendNode::add_waiting_keyframes() {
   }
 }
 
-void BackendNode::on_command(const graph_command_t& command) {
-  if (command.session != -1 && command.session != graph_.session()) return;
+/// Why it is refused, or "". Whatever is carried out is written to the journal and told to everybody.
+const char* BackendNode::on_command(const graph_command_t& command) {
+  if (command.session != -1 && command.session != graph_.session()) return "";
+  if (!is_known(command)) return "there is no such command";
+  if (!commands_.allow(std::chrono::steady_clock::now())) return "too many commands";
   if (command.command == graph_command_t::SEND_FULL_SET) {
     publish_full_set();
-    return;
+    return "";
+  }
+  if (!names_keyframes_of(graph_.smoother().all_poses(), command)) {
+    constexpr const char* kUnknown = "the graph does not hold these two keyframes";
+    publish_loop(answer_to(command, kUnknown));
+    return kUnknown;
   }
   const SmootherUpdate update = graph_.change([&](Smoother& smoother) {
     return command.command == graph_command_t::VETO_LOOP ? smoother.veto_loop(command.from_id, command.to_id)
                                                          : smoother.withdraw_loop(command.from_id, command.to_id);
   });
   publish_update(answered(update, command));
+  return "";
 }
 
 void BackendNode::adopt_due_optimum() {
   if (!schedule_.adoption_due(graph_.smoother().stats().keyframes)) return;
   schedule_.end();
-  const ShadowOptimum optimum = optimum_.get();
+  const ShadowOptimum optimum = optimum_.take();
   const int swaps = graph_.smoother().stats().shadow_swaps;
   const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(optimum); });
   if (graph_.smoother().stats().shadow_swaps != swaps) publish_update(update);
@@ -130,7 +151,7 @@ void BackendNode::adopt_due_optimum() {
 void BackendNode::begin_due_optimum() {
   if (!schedule_.begin_due()) return;
   schedule_.begin(graph_.smoother().stats().keyframes);
-  optimum_ = std::async(std::launch::async, solve, graph_.shadow_problem());
+  optimum_.begin(graph_.shadow_problem());
 }
 
 void BackendNode::publish_update(const SmootherUpdate& update) {
@@ -189,8 +210,7 @@ void BackendNode::request_missing_keyframes() {
   if (graph_.session() < 0) return;
   const std::int32_t expected = graph_.smoother().expected_id();
   if (const std::optional<std::int32_t> hopeless = inbox_.hopeless_before(expected)) {
-    graph_.accept_gap_before(*hopeless);
-    add_waiting_keyframes();
+    give_up_before(*hopeless);
     return;
   }
   keyframe_request_t request{};
@@ -204,10 +224,20 @@ void BackendNode::request_missing_keyframes() {
   link_.publish(channels::kKeyframeRequest, request);
 }
 
+void BackendNode::give_up_before(std::int32_t id) {
+  const std::int32_t expected = graph_.smoother().expected_id();
+  std::cerr << std::format("graph_backend: keyframes {} to {} are given up: nobody sends them again", expected, id - 1)
+            << std::endl;
+  keyframes_given_up_ += std::int64_t{id} - expected;
+  graph_.accept_gap_before(id);
+  add_waiting_keyframes();
+}
+
 void BackendNode::publish_health() {
-  keyframe_counts_->queue_drops = assembler_.incomplete();
+  keyframe_counts_->queue_drops = assembler_.incomplete() + inbox_.dropped() + keyframes_given_up_;
   const SmootherStats stats = graph_.smoother().stats();
   const bool cloud_was_lost = cloud_losses_.look(stats.clouds_unreadable, std::chrono::steady_clock::now());
+  const bool keyframe_was_lost = keyframe_losses_.look(keyframes_given_up_, std::chrono::steady_clock::now());
   if (!stats.solver_failure.empty()) {
     link_.report_health(
         newest_utime_, health_t::FAULT,
@@ -220,6 +250,9 @@ void BackendNode::publish_health() {
   } else if (!inbox_.empty()) {
     link_.report_health(newest_utime_, health_t::DEGRADED,
                         std::format("waiting for keyframe {}", graph_.smoother().expected_id()));
+  } else if (keyframe_was_lost) {
+    link_.report_health(newest_utime_, health_t::DEGRADED,
+                        std::format("{} keyframes are given up; the graph has holes there", keyframes_given_up_));
   } else if (stats.clouds_unreadable > 0) {
     link_.report_health(newest_utime_, cloud_was_lost ? health_t::DEGRADED : health_t::OK,
                         std::format("{}{} times the journal did not give a cloud back, and a loop was refused for it",

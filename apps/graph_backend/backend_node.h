@@ -2,10 +2,10 @@
 #pragma once
 
 #include <filesystem>
-#include <future>
 #include <optional>
 
 #include "backend/shadow_schedule.h"
+#include "background_solve.h"
 #include "common/leap_guard.h"
 #include "keyframe_inbox.h"
 #include "lasting_graph.h"
@@ -13,6 +13,7 @@
 #include "messages/keyframe_messages.h"
 #include "messages/odometry_messages.h"
 #include "runtime/lcm_link.h"
+#include "runtime/rate_limit.h"
 #include "runtime/recent_rise.h"
 
 namespace ignis {
@@ -29,12 +30,13 @@ class BackendNode {
  private:
   void on_keyframe_part(const keyframe_t& part);
   void on_state(const state_t& message);
-  void on_command(const graph_command_t& command);
+  [[nodiscard]] const char* on_command(const graph_command_t& command);
   void add_waiting_keyframes();
   [[nodiscard]] bool refuse_damaged(const Keyframe& keyframe);
   [[nodiscard]] bool is_next_state(const NavState& state);
   void begin_session(std::int32_t session);
   void request_missing_keyframes();
+  void give_up_before(std::int32_t id);
   void adopt_due_optimum();
   void begin_due_optimum();
   void publish_update(const SmootherUpdate& update);
@@ -50,8 +52,9 @@ class BackendNode {
   messages::KeyframeAssembler assembler_;
   LastingGraph graph_;
   KeyframeInbox inbox_;
+  RateLimit commands_{10.0, 50.0};  // a person, or a script that vetoes what it has found
   ShadowSchedule schedule_;
-  std::future<ShadowOptimum> optimum_;  // waits in its destructor, and when it is replaced, for the solve under way
+  BackgroundSolve optimum_;
   Pose T_map_odom_;
   Utime newest_utime_ = 0;
   std::optional<Utime> newest_state_;  // [us] of LIO_STATE
@@ -60,6 +63,8 @@ class BackendNode {
   std::chrono::steady_clock::time_point last_full_{};
   SmootherUpdate last_update_;
   runtime::RecentRise cloud_losses_{std::chrono::seconds(60)};
+  std::int64_t keyframes_given_up_ = 0;
+  runtime::RecentRise keyframe_losses_{std::chrono::seconds(60)};
   std::string refusal_;  // of the newest keyframe; empty when it was accepted
   std::int32_t revision_sequence_ = 0;
   std::int32_t loop_sequence_ = 0;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keyframe_inbox.h"
 
+#include <iterator>
+#include <limits>
+#include <utility>
+
 namespace ignis {
 namespace {
 
@@ -12,9 +16,38 @@ constexpr int kMaxRequests = 40;
 
 }  // namespace
 
-void KeyframeInbox::put(Keyframe keyframe, Time now) {
-  last_arrival_ = now;
+void KeyframeInbox::clear() {
+  const std::int64_t dropped = dropped_;
+  *this = {};
+  dropped_ = dropped;
+}
+
+bool KeyframeInbox::is_far_ahead(std::int32_t id, std::int32_t expected) const {
+  const std::int64_t newest = waiting_.empty() ? expected : waiting_.rbegin()->first;
+  return id > newest + kMostAhead;
+}
+
+void KeyframeInbox::hold(Keyframe keyframe) {
   waiting_.insert_or_assign(keyframe.id, std::move(keyframe));
+  if (waiting_.size() <= kMostWaiting) return;
+  waiting_.erase(std::prev(waiting_.end()));
+  ++dropped_;
+}
+
+bool KeyframeInbox::put(Keyframe keyframe, std::int32_t expected, Time now) {
+  if (is_far_ahead(keyframe.id, expected)) {
+    // After a long absence that is where the drive is by now.
+    std::optional<Keyframe> before = std::exchange(put_aside_, std::nullopt);
+    const bool carries_on = before && keyframe.id - 1 == before->id && keyframe.previous_utime == before->state.utime;
+    if (!carries_on) {
+      put_aside_ = std::move(keyframe);
+      return false;
+    }
+    hold(std::move(*before));
+  }
+  last_arrival_ = now;
+  hold(std::move(keyframe));
+  return true;
 }
 
 std::optional<Keyframe> KeyframeInbox::take(std::int32_t expected) {
@@ -35,8 +68,9 @@ std::vector<std::int32_t> KeyframeInbox::ids_to_request(std::int32_t expected, T
     requested_id_ = expected;
     ++requests_;
   }
-  for (std::int32_t id = expected; ids.size() < kMaxIdsPerRequest; ++id) {
-    if (has_gap && id >= waiting_.rbegin()->first) break;
+  // Behind the last id there is none.
+  const std::int32_t end = has_gap ? waiting_.rbegin()->first : std::numeric_limits<std::int32_t>::max();
+  for (std::int32_t id = expected; id < end && ids.size() < kMaxIdsPerRequest; ++id) {
     if (!waiting_.contains(id)) ids.push_back(id);
   }
   return ids;

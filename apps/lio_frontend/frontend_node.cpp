@@ -17,7 +17,8 @@ namespace channels = runtime::channels;
 
 constexpr int kPollMs = 100;
 constexpr int kRequestQueue = 100;
-constexpr std::size_t kMostResentParts = 24;  // in one answer, so that the live flow goes on
+// In one answer, so that the live flow goes on: of the clouds that a map asks for at a time, and of their keyframes.
+constexpr std::size_t kMostResentParts = 36;
 constexpr Utime kCheckpointPeriod = 400'000;  // [us]
 
 /// Calls `work` and returns its result with the wall time it took [ms].
@@ -142,14 +143,20 @@ void FrontendNode::publish_keyframe(const Keyframe& keyframe) {
 void FrontendNode::on_request(const keyframe_request_t& request) {
   const std::set<std::int32_t> wanted(request.ids.begin(), request.ids.end());
   for (const std::int32_t id : wanted) {
-    const std::vector<keyframe_t>* parts = sent_keyframes_.find(request.session, id);
-    if (parts == nullptr) continue;
-    if (!resends_.allow(std::chrono::steady_clock::now())) {
+    if (!resend_keyframe(request.session, id)) {
       ++request_counts_->rejected;
       return;
     }
-    for (const keyframe_t& part : *parts) link_.publish(channels::kKeyframe, part);
   }
+}
+
+/// The number of parts, none when the keyframe is not there; nothing when too many were asked for lately.
+std::optional<std::size_t> FrontendNode::resend_keyframe(std::int32_t session, std::int32_t id) {
+  const std::vector<keyframe_t>* parts = sent_keyframes_.find(session, id);
+  if (parts == nullptr) return 0;
+  if (!resends_.allow(std::chrono::steady_clock::now())) return std::nullopt;
+  for (const keyframe_t& part : *parts) link_.publish(channels::kKeyframe, part);
+  return parts->size();
 }
 
 /// On a channel of their own: whoever follows LIO_CLOUD has had them. A keyframe goes first, so that who has a cloud
@@ -159,17 +166,19 @@ void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
     ++cloud_request_counts_->rejected;
     return;
   }
+  std::set<std::int32_t> answered;
   std::size_t parts = 0;
   for (const std::int32_t number : request.ids) {
     const SentClouds::Sent* sent = sent_clouds_.find(request.session, number);
-    if (sent == nullptr) continue;
-    const std::vector<keyframe_t>* keyframe =
-        sent->keyframe ? sent_keyframes_.find(request.session, *sent->keyframe) : nullptr;
-    if (keyframe != nullptr) {
-      for (const keyframe_t& part : *keyframe) link_.publish(channels::kKeyframe, part);
+    if (sent == nullptr || !answered.insert(number).second) continue;
+    const std::optional<std::size_t> keyframe_parts =
+        sent->keyframe ? resend_keyframe(request.session, *sent->keyframe) : 0;
+    if (!keyframe_parts) {
+      ++cloud_request_counts_->rejected;
+      return;
     }
     for (const cloud_t& part : sent->parts) link_.publish(channels::kCloudAgain, part);
-    parts += sent->parts.size();
+    parts += sent->parts.size() + *keyframe_parts;
     if (parts >= kMostResentParts) return;
   }
 }

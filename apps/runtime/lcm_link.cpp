@@ -18,6 +18,7 @@ namespace {
 constexpr std::chrono::seconds kHealthPeriod{1};
 constexpr std::chrono::milliseconds kTextPeriod{200};
 constexpr double kSamplePeriod_s = 1.0;
+constexpr double kHearingPeriod_s = 0.2;  // of HEALTH with the addresses
 constexpr int kHealthQueue = 100;
 constexpr char kSocketName[] = "UDP";  // in HEALTH, for what the kernel dropped before any channel was known
 
@@ -112,15 +113,33 @@ void LcmLink::watch_peers() {
   subscribe<health_t>(
       channels::kHealth, kHealthQueue,
       [this](const health_t& message) {
-        peers_.observe({.process = message.process,
-                        .pid = message.pid,
-                        .version = message.version,
-                        .config_hash = message.config_hash},
-                       uptime_s(), message.uptime_s);
+        if (!PeerWatch::is_possible(message.uptime_s)) return "its uptime is impossible";
+        // Those that come over UDP are heard with their addresses.
+        if (!addresses_) observe_peer(message, {});
+        return "";
       },
       Senders::kSeveral);
   // After the subscription: BusSocket takes every socket on the bus's port for LCM's.
   if (address_) addresses_.emplace(*address_);
+}
+
+void LcmLink::observe_peer(const health_t& message, const UdpAddress& sender) {
+  const bool is_ours = message.process == identity_.process && message.pid == identity_.pid &&
+                       std::ranges::contains(own_uptimes_s_, message.uptime_s);
+  if (is_ours) return;
+  peers_.observe({.process = message.process,
+                  .pid = message.pid,
+                  .version = message.version,
+                  .config_hash = message.config_hash,
+                  .sender = sender},
+                 uptime_s(), message.uptime_s);
+}
+
+void LcmLink::hear_peers() {
+  const double now = uptime_s();
+  if (!addresses_ || now - last_hearing_s_ < kHearingPeriod_s) return;
+  last_hearing_s_ = now;
+  addresses_->hear([this](const health_t& message, const UdpAddress& sender) { observe_peer(message, sender); });
 }
 
 /// Two senders of one channel are one stream of nonsense; what the later one says is not even received.
@@ -128,14 +147,12 @@ void LcmLink::ignore_latecomers() {
   const double now = uptime_s();
   if (!addresses_ || !socket_ || now - last_look_s_ < kSamplePeriod_s) return;
   last_look_s_ = now;
-  addresses_->hear();
   ignored_.clear();
   std::vector<UdpAddress> unheard;
   for (const PeerIdentity& late : peers_.latecomers(now)) {
-    const std::optional<UdpAddress> sender = addresses_->of(late.process, late.pid);
-    if (!sender) continue;
+    if (addresses_->speaks_for_others(late.sender, late.process)) continue;
     ignored_.push_back(late);
-    unheard.push_back(*sender);
+    unheard.push_back(late.sender);
   }
   socket_->ignore(unheard);
 }
@@ -172,6 +189,7 @@ std::int8_t LcmLink::own_state() const {
 
 void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets) {
   watch_peers();
+  hear_peers();
   ignore_latecomers();
   sample_budget();
   supervisor_.turn(progress_, uptime_s());
@@ -203,6 +221,7 @@ void LcmLink::publish_health(health_t& message) {
   message.version = identity_.version;
   message.config_hash = identity_.config_hash;
   message.uptime_s = uptime_s();
+  own_uptimes_s_[static_cast<std::size_t>(message.sequence) % own_uptimes_s_.size()] = message.uptime_s;
   message.progress = progress_;
   message.failed_sends = failed_sends_;
   message.cpu_percent = budget_.cpu_percent();

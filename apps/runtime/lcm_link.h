@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <deque>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <lcm/lcm-cpp.hpp>
@@ -52,9 +54,10 @@ class LcmLink {
     if (lcm_.publish(channel, &message) != 0) ++failed_sends_;
   }
 
-  /// Calls `handler` with each well-formed message. The counts stay valid as long as the link.
-  template <class Message>
-  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity, std::function<void(const Message&)> handler,
+  /// Calls `handler` with each well-formed message. It may return why it refuses one, for HEALTH and the log: a string
+  /// literal, empty when it does not. The counts stay valid as long as the link.
+  template <class Message, class Handler>
+  ReceiverCounts& subscribe(const std::string& channel, int queue_capacity, Handler handler,
                             Senders senders = Senders::kOne) {
     Receiver& receiver = receivers_.emplace_back();
     receiver.counts.channel = channel;
@@ -68,8 +71,12 @@ class LcmLink {
       }
       ++receiver.counts.received;
       if (senders == Senders::kOne) receiver.counts.lost += receiver.sequence.observe(message.sequence);
-      handler(message);
-      return "";
+      if constexpr (std::is_void_v<std::invoke_result_t<const Handler&, const Message&>>) {
+        handler(message);
+        return "";
+      } else {
+        return handler(message);
+      }
     };
     subscribe_raw(receiver, queue_capacity);
     return receiver.counts;
@@ -106,6 +113,8 @@ class LcmLink {
   void take(std::span<const std::byte> data, Receiver& receiver);
   void refuse(Receiver& receiver, const std::string& reason, bool is_foreign);
   void watch_peers();
+  void observe_peer(const health_t& message, const UdpAddress& sender);
+  void hear_peers();
   void ignore_latecomers();
   void sample_budget();
   void publish_health(health_t& message);
@@ -131,6 +140,8 @@ class LcmLink {
   bool watching_peers_ = false;
   std::optional<SenderAddresses> addresses_;
   std::vector<PeerIdentity> ignored_;
+  std::array<double, 256> own_uptimes_s_{};  // in our newest HEALTH messages: by them we know our own
+  double last_hearing_s_ = -1.0;
   double last_look_s_ = -1.0;
   double last_sample_s_ = -1.0;
   std::int64_t progress_ = 0;

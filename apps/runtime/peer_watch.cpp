@@ -10,25 +10,40 @@ namespace {
 
 constexpr std::size_t kMaxTextLength = 64;  // our names, versions and fingerprints are shorter
 
+/// The process ids of two instances, and where they are if the ids alone do not tell.
+std::string both(const PeerIdentity& a, const PeerIdentity& b) {
+  if (a.pid != b.pid) return std::format("{} and {}", a.pid, b.pid);
+  const auto place = [](const UdpAddress& of) {
+    return std::format("{}.{}.{}.{}:{}", of.ip >> 24U, of.ip >> 16U & 255U, of.ip >> 8U & 255U, of.ip & 255U, of.port);
+  };
+  return std::format("{} at {} and {}", a.pid, place(a.sender), place(b.sender));
+}
+
 }  // namespace
 
+PeerWatch::Key PeerWatch::key_of(const PeerIdentity& peer) {
+  return {peer.process.substr(0, kMaxTextLength), peer.pid, peer.sender};
+}
+
 void PeerWatch::observe(const PeerIdentity& peer, double now_s, double uptime_s) {
-  if (peer.process == self_.process && peer.pid == self_.pid) return;
+  if (key_of(peer) == key_of(self_) || !is_possible(uptime_s)) return;
   std::erase_if(peers_, [&](const auto& entry) { return now_s - entry.second.last_s > kForgetAfter_s; });
-  const std::pair key{peer.process.substr(0, kMaxTextLength), peer.pid};
+  const Key key = key_of(peer);
   if (peers_.size() >= kMaxPeers && !peers_.contains(key)) return;
   Heard& heard = peers_[key];
-  heard.peer = {.process = key.first,
+  heard.peer = {.process = std::get<std::string>(key),
                 .pid = peer.pid,
                 .version = peer.version.substr(0, kMaxTextLength),
-                .config_hash = peer.config_hash.substr(0, kMaxTextLength)};
+                .config_hash = peer.config_hash.substr(0, kMaxTextLength),
+                .sender = peer.sender};
   if (heard.messages == 0) {
     heard.started_s = now_s - uptime_s;
     heard.first_s = now_s;
   }
   heard.last_s = now_s;
   ++heard.messages;
-  note_start(key.first, peer.pid, now_s);
+  note_start(heard.peer.process, peer.pid, now_s);
+  judge_latecomers(heard.peer.process, now_s);
 }
 
 void PeerWatch::note_start(const std::string& process, std::int32_t pid, double now_s) {
@@ -78,11 +93,32 @@ std::vector<std::pair<const PeerWatch::Heard*, const PeerWatch::Heard*>> PeerWat
   return found;
 }
 
+/// Whether one of this name is still heard that is no latecomer.
+bool PeerWatch::has_right_one(const std::string& process, double now_s) const {
+  return std::ranges::any_of(peers_, [&](const auto& entry) {
+    const Heard& heard = entry.second;
+    return heard.peer.process == process && !heard.is_late && now_s - heard.last_s <= kForgetAfter_s;
+  });
+}
+
+void PeerWatch::judge_latecomers(const std::string& process, double now_s) {
+  if (!has_right_one(process, now_s)) {
+    for (auto& [key, heard] : peers_) {
+      if (heard.peer.process == process) heard.is_late = false;
+    }
+  }
+  for (const auto& [a, b] : twins(now_s)) {
+    if (a->peer.process != process || a->is_late || b->is_late) continue;
+    const PeerIdentity& later = a->started_s <= b->started_s ? b->peer : a->peer;
+    peers_.at(key_of(later)).is_late = true;
+  }
+}
+
 std::vector<PeerIdentity> PeerWatch::latecomers(double now_s) const {
   std::vector<PeerIdentity> late;
-  for (const auto& [a, b] : twins(now_s)) {
-    const PeerIdentity& later = a->started_s <= b->started_s ? b->peer : a->peer;
-    if (!std::ranges::contains(late, later)) late.push_back(later);
+  for (const auto& [key, heard] : peers_) {
+    const bool is_heard = now_s - heard.last_s <= kForgetAfter_s;
+    if (heard.is_late && is_heard && has_right_one(heard.peer.process, now_s)) late.push_back(heard.peer);
   }
   return late;
 }
@@ -97,8 +133,7 @@ std::string PeerWatch::trouble(double now_s) const {
     if (now_s - heard.last_s <= kForgetAfter_s) add(disagreement(heard));
   }
   for (const auto& [a, b] : twins(now_s)) {
-    add(std::format("two instances of {} are on the bus (processes {} and {})", a->peer.process, a->peer.pid,
-                    b->peer.pid));
+    add(std::format("two instances of {} are on the bus (processes {})", a->peer.process, both(a->peer, b->peer)));
   }
   for (const auto& [process, starts] : starts_) {
     if (starts.size() == kCrashLoopStarts && now_s - starts.front().heard_s <= kCrashLoopSeconds) {

@@ -64,8 +64,8 @@ SenderAddresses::SenderAddresses(const BusAddress& bus)
 
 SenderAddresses::~SenderAddresses() { ::close(socket_); }
 
-void SenderAddresses::hear() {
-  std::array<std::byte, kLargestDatagram> buffer{};
+void SenderAddresses::hear(const Listener& listener) {
+  std::array<std::byte, kLargestDatagram> buffer;
   for (int i = 0; i < kDatagramsAtOnce; ++i) {
     sockaddr_in from{};
     socklen_t length = sizeof from;
@@ -73,27 +73,25 @@ void SenderAddresses::hear() {
         recvfrom(socket_, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
     if (size < 0) return;
     note(std::span(buffer).first(static_cast<std::size_t>(size)),
-         {.ip = ntohl(from.sin_addr.s_addr), .port = ntohs(from.sin_port)});
+         {.ip = ntohl(from.sin_addr.s_addr), .port = ntohs(from.sin_port)}, listener);
   }
 }
 
-void SenderAddresses::note(std::span<const std::byte> datagram, const UdpAddress& sender) {
+void SenderAddresses::note(std::span<const std::byte> datagram, const UdpAddress& sender, const Listener& listener) {
   const std::size_t body = kLcmHeader + std::string_view(channels::kHealth).size() + 1;
   health_t message;
   if (datagram.size() < body || !messages::decode_checked(datagram.subspan(body), message)) return;
   if (message.process.size() > kLongestName) return;
-  Process process{message.process, message.pid};
+  std::pair heard{sender, message.process};
   // Processes come and go; whoever is there still is heard again within a second.
-  if (senders_.size() >= kMaxProcesses && !senders_.contains(process)) senders_.clear();
-  senders_.insert_or_assign(std::move(process), sender);
+  if (senders_.size() >= kMaxSenders && !senders_.contains(heard)) senders_.clear();
+  senders_.insert(std::move(heard));
+  listener(message, sender);
 }
 
-std::optional<UdpAddress> SenderAddresses::of(const std::string& process, std::int32_t pid) const {
-  const auto found = senders_.find({process, pid});
-  if (found == senders_.end()) return std::nullopt;
-  const bool is_a_players = std::ranges::any_of(
-      senders_, [&](const auto& entry) { return entry.second == found->second && entry.first.first != process; });
-  return is_a_players ? std::nullopt : std::optional(found->second);
+bool SenderAddresses::speaks_for_others(const UdpAddress& sender, const std::string& process) const {
+  return std::ranges::any_of(senders_,
+                             [&](const auto& heard) { return heard.first == sender && heard.second != process; });
 }
 
 }  // namespace ignis::runtime

@@ -2,24 +2,26 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <map>
-#include <optional>
+#include <functional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
 
+#include "ignis/health_t.hpp"
 #include "runtime/bus_filter.h"
 #include "runtime/bus_socket.h"
 
 namespace ignis::runtime {
 
-/// Where each process on the bus sends from. LCM does not hand on a datagram's address, and messages carry no sender;
-/// HEALTH names its process, so a socket of our own hears HEALTH a second time, with the addresses.
+/// Where each process on the bus sends from. LCM does not hand on a datagram's address, and messages carry no sender:
+/// a socket of our own hears HEALTH a second time, with the addresses.
 class SenderAddresses {
  public:
-  /// Processes remembered at most: they come from the bus.
-  static constexpr std::size_t kMaxProcesses = 64;
+  using Listener = std::function<void(const health_t&, const UdpAddress&)>;
+
+  /// Names and addresses remembered at most: they come from the bus.
+  static constexpr std::size_t kMaxSenders = 64;
 
   /// Joins the bus beside LCM. Throws std::system_error when that is impossible.
   explicit SenderAddresses(const BusAddress& bus);
@@ -27,20 +29,17 @@ class SenderAddresses {
   SenderAddresses(const SenderAddresses&) = delete;
   SenderAddresses& operator=(const SenderAddresses&) = delete;
 
-  /// Takes what has arrived since the last call, without waiting.
-  void hear();
+  /// Tells what has arrived since the last call, without waiting.
+  void hear(const Listener& listener);
 
-  /// Where this process sends from. Nothing when it was not heard, or when the address speaks for processes of other
-  /// names too: a player of a log is no instance of any of them.
-  [[nodiscard]] std::optional<UdpAddress> of(const std::string& process, std::int32_t pid) const;
+  /// Whether the address speaks for processes of other names too: a player of a log is no instance of any of them.
+  [[nodiscard]] bool speaks_for_others(const UdpAddress& sender, const std::string& process) const;
 
  private:
-  using Process = std::pair<std::string, std::int32_t>;  // name and process id
-
-  void note(std::span<const std::byte> datagram, const UdpAddress& sender);
+  void note(std::span<const std::byte> datagram, const UdpAddress& sender, const Listener& listener);
 
   int socket_ = -1;
-  std::map<Process, UdpAddress> senders_;
+  std::set<std::pair<UdpAddress, std::string>> senders_;
 };
 
 }  // namespace ignis::runtime

@@ -5,6 +5,7 @@
 #include <gtsam/nonlinear/Values.h>
 
 #include <format>
+#include <limits>
 #include <optional>
 
 #include "backend/information.h"
@@ -127,7 +128,7 @@ void count_verdict(KeyframeVerdict verdict, SmootherState& state) {
     case KeyframeVerdict::kInvalid:
     case KeyframeVerdict::kSolver:
       ++state.stats.invalid;
-      ++state.expected_id;
+      if (state.expected_id < std::numeric_limits<std::int32_t>::max()) ++state.expected_id;
       break;
     case KeyframeVerdict::kOtherSession:
     case KeyframeVerdict::kAccepted:

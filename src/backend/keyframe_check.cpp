@@ -2,6 +2,7 @@
 #include "backend/keyframe_check.h"
 
 #include <cmath>
+#include <limits>
 
 namespace ignis {
 namespace {
@@ -18,6 +19,7 @@ constexpr double kAbsurdVariance = 1e12;     // in units of the state: beyond it
 
 std::string keyframe_problem(const Keyframe& keyframe) {
   const NavState& state = keyframe.state;
+  if (keyframe.id == std::numeric_limits<std::int32_t>::max()) return "no id can follow this one";
   if (!state.T_odom_body.all_finite()) return "the pose is not finite";
   if (!state.v_odom.allFinite()) return "the velocity is not finite";
   if (!state.gyro_bias.allFinite() || !state.accel_bias.allFinite()) return "a bias is not finite";

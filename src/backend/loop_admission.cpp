@@ -160,6 +160,16 @@ void explain_waiting(const Hearing& hearing, SmootherState& state, LoopEvents& e
   }
 }
 
+/// Several at once where loops in the graph were outvoted.
+void forget_oldest_waiting(SmootherState& state, LoopEvents& events) {
+  while (state.waiting.size() > kMostWaiting) {
+    GraphLoop& forgotten = events.emplace_back(std::move(state.waiting.front()));
+    state.waiting.erase(state.waiting.begin());
+    forgotten.result.stage = LoopStage::kWithdrawn;
+    forgotten.result.reason_text = std::format("forgotten: more than {} loops wait", kMostWaiting);
+  }
+}
+
 void enter_believed(const Hearing& hearing, const BackendConfig& config, IncrementalSolver& solver,
                     SmootherState& state, LoopEvents& events) {
   const auto deserves = [&](const GraphLoop& loop) {
@@ -168,21 +178,21 @@ void enter_believed(const Hearing& hearing, const BackendConfig& config, Increme
   // One that enters may support those that waited before it.
   for (auto next = std::ranges::find_if(state.waiting, deserves); next != state.waiting.end();
        next = std::ranges::find_if(state.waiting, deserves)) {
-    const GraphLoop copy = std::move(*next);
+    GraphLoop entering = std::move(*next);
     state.waiting.erase(next);
-    const LoopEntry entry = enter_graph(copy, config, solver, state);
+    const LoopEntry entry = enter_graph(entering, config, solver, state);
     if (!entry.entered) {
-      events.push_back(copy);
+      events.push_back(std::move(entering));
       events.back().result.reason = LoopReason::kSolverRefused;
       events.back().result.reason_text = entry.refusal;
       continue;
     }
-    state.last_loop_id = std::max(state.last_loop_id, copy.result.from_id);
+    state.last_loop_id = std::max(state.last_loop_id, entering.result.from_id);
     events.push_back(state.loops.back());
     withdraw_contradicted(entry.rise, config, solver, state, events);
   }
   explain_waiting(hearing, state, events);
-  if (state.waiting.size() > kMostWaiting) state.waiting.erase(state.waiting.begin());
+  forget_oldest_waiting(state, events);
 }
 
 }  // namespace

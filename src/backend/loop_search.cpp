@@ -125,9 +125,10 @@ LoopProposal best_match(const std::vector<std::size_t>& chosen, SmootherState& s
 }  // namespace
 
 bool is_vetoed(std::span<const LoopVeto> vetoes, std::int32_t from_id, std::int32_t to_id, int spacing) {
-  return std::ranges::any_of(vetoes, [&](const LoopVeto& veto) {
-    return std::abs(veto.from_id - from_id) <= spacing && std::abs(veto.to_id - to_id) <= spacing;
-  });
+  // A journal may hold a veto of any two numbers.
+  const auto are_near = [spacing](std::int64_t a, std::int64_t b) { return std::abs(a - b) <= spacing; };
+  return std::ranges::any_of(
+      vetoes, [&](const LoopVeto& veto) { return are_near(veto.from_id, from_id) && are_near(veto.to_id, to_id); });
 }
 
 LoopProposal search_loop(SmootherState& state, const BackendConfig& config, const LoopGates& gates) {

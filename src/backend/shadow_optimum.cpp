@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <optional>
 #include <vector>
 
@@ -36,8 +37,13 @@ struct ShadowOptimum::Solution {
 
 namespace {
 
-gtsam::LevenbergMarquardtParams parameters() {
+struct Stopped : std::exception {};
+
+gtsam::LevenbergMarquardtParams parameters(const std::stop_token& stop) {
   gtsam::LevenbergMarquardtParams params;
+  params.iterationHook = [stop](std::size_t, double, double) {
+    if (stop.stop_requested()) throw Stopped();
+  };
   params.setRelativeErrorTol(1e-10);
   params.setAbsoluteErrorTol(1e-8);
   params.setMaxIterations(100);
@@ -83,14 +89,14 @@ std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optim
 
 }  // namespace
 
-ShadowOptimum solve(const ShadowProblem& problem) {
+ShadowOptimum solve(const ShadowProblem& problem, const std::stop_token& stop) {
   ShadowOptimum result;
   if (!problem.graph || problem.graph->ids.empty()) return result;
   const ShadowProblem::Graph& graph = *problem.graph;
   result.revision = graph.revision;
   result.keyframes = static_cast<int>(graph.ids.size());
   try {
-    gtsam::LevenbergMarquardtOptimizer optimizer(graph.factors, graph.estimate, parameters());
+    gtsam::LevenbergMarquardtOptimizer optimizer(graph.factors, graph.estimate, parameters(stop));
     result.half_chi_square_before = optimizer.error();
     auto solution = std::make_shared<ShadowOptimum::Solution>();
     solution->values = optimizer.optimize();

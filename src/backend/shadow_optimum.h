@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 
 /// The batch optimum of the smoother's graph, computed beside it: how far is the incremental solution from it?
 namespace ignis {
@@ -23,10 +24,11 @@ struct ShadowOptimum {
   double largest_gap_rad = 0.0;
   double half_chi_square_before = 0.0;  ///< of the copied estimate
   double half_chi_square = 0.0;         ///< of the optimum
-  bool solved = false;                  ///< false: the solver threw, or what it found is not finite or no better
+  bool solved = false;  ///< false: stopped, or the solver threw, or what it found is not finite or no better
 };
 
-/// Pure: no state is shared with the smoother. Seconds for thousands of keyframes.
-[[nodiscard]] ShadowOptimum solve(const ShadowProblem& problem);
+/// Pure: no state is shared with the smoother. Seconds for thousands of keyframes; asked to stop it ends with the
+/// iteration under way.
+[[nodiscard]] ShadowOptimum solve(const ShadowProblem& problem, const std::stop_token& stop = {});
 
 }  // namespace ignis

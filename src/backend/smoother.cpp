@@ -148,7 +148,8 @@ SmootherUpdate Smoother::withdraw_loop(std::int32_t from_id, std::int32_t to_id)
 }
 
 SmootherUpdate Smoother::veto_loop(std::int32_t from_id, std::int32_t to_id) {
-  impl_->state.vetoes.push_back({from_id, to_id});
+  const LoopVeto veto{from_id, to_id};
+  if (!std::ranges::contains(impl_->state.vetoes, veto)) impl_->state.vetoes.push_back(veto);
   return withdraw_loop(from_id, to_id);
 }
 

@@ -36,6 +36,8 @@ struct GraphLoop {
 struct LoopVeto {
   std::int32_t from_id = 0;
   std::int32_t to_id = 0;
+
+  bool operator==(const LoopVeto&) const = default;
 };
 
 /// All that the smoother knows besides the solver's factors and values. Plain data; the functions that change it stand

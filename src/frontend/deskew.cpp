@@ -62,8 +62,9 @@ Eigen::Vector3d Deskewer::Segment::at(double dt, const Eigen::Vector3d& point) c
 void Deskewer::find_knots(const Scan& scan, std::span<const ImuSample> samples) {
   knots_.clear();
   knots_.push_back(sample_at(samples, scan.utime));
-  for (const ImuSample& sample : samples) {
-    if (sample.utime > scan.utime && sample.utime < scan.end_utime()) knots_.push_back(sample);
+  const auto first = std::ranges::upper_bound(samples, scan.utime, {}, &ImuSample::utime);
+  for (auto sample = first; sample != samples.end() && sample->utime < scan.end_utime(); ++sample) {
+    knots_.push_back(*sample);
   }
   knots_.push_back(sample_at(samples, scan.end_utime()));
 }

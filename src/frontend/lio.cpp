@@ -18,7 +18,6 @@ constexpr std::size_t kMaxPendingScans = 40;               // two seconds of L1 
 constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a scan but a broken stamp
 constexpr std::int64_t kMinScanPeriodUs = 8'000;           // of scans that are worth the time that matching takes
 constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
-constexpr std::int64_t kHistoryUs = 3 * kMicrosPerSecond;  // IMU kept to deskew with and to dead reckon from
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
 constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
@@ -70,11 +69,12 @@ void Lio::reset() {
   filter_ = FilterState();
   live_ = NavState();
   velocity_known_ = false;
+  mapped_velocity_variance_ = 0.0;
   applied_scans_ = 0;
   contradictions_ = 0;
   scans_without_correction_ = 0;
   trust_ = TrustMonitor(config_);
-  opinion_.forget();
+  opinion_ = SecondOpinion(config_);
   last_clipped_.reset();
   last_standstill_.reset();
   resumed_from_.reset();
@@ -118,9 +118,9 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   std::ranges::move(process_pending(), std::back_inserter(result.scans));
   if (running_) {
     advance_to(sample.utime - to_micros(config_.max_scan_delay_s));
-    imu_.forget_before(filter_.nominal.utime - kHistoryUs);
     result.state = live_;
   }
+  forget_old_samples();
   return result;
 }
 
@@ -158,6 +158,7 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
   pending_.push_back(std::move(scan));
   coast_to(*last_scan_end_ - to_micros(config_.imu_timeout_s));
   results = process_pending();
+  forget_old_samples();  // those made up while the IMU is silent, too
   if (pending_.size() > kMaxPendingScans) {
     results.push_back(refuse(pending_.front(), ScanReason::kNoImu));
     pending_.pop_front();

@@ -91,6 +91,7 @@ class Lio {
   [[nodiscard]] ScanResult result_of(const Scan& scan, const MatchResult& match, std::vector<CloudPoint> cloud,
                                      std::vector<CloudPoint> sparse);
   [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
+  void forget_old_samples();
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
                                     double age);

@@ -65,7 +65,9 @@ void LocalMap::clear() {
   scans_ = 0;
   inserted_points_ = 0;
   has_slid_ = false;
+  sure_since_ = 0;
   unswept_ = 0;
+  sweep_step_ = 0;
 }
 
 LocalMap::Region& LocalMap::find_or_add_region(const Eigen::Vector3i& coordinate) {

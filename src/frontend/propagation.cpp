@@ -11,9 +11,10 @@
 namespace ignis {
 namespace {
 
-constexpr std::int64_t kCoastingStepUs = 10'000;          // between samples that stand in for a silent IMU
-constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;  // after a clipped sample the biases learn nothing
-constexpr double kSaturatedNoiseScale = 1e4;              // a clipped axis may be off by any amount
+constexpr std::int64_t kHistoryUs = 3 * kMicrosPerSecond;  // IMU kept to deskew with and to dead reckon from
+constexpr std::int64_t kCoastingStepUs = 10'000;           // between samples that stand in for a silent IMU
+constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sample the biases learn nothing
+constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
 
 /// Calls `step(next, input, dt)` for each piece of the line through the samples from `now` to `until`; `now` follows.
 /// `next` is the sample that the piece leads to.
@@ -89,6 +90,12 @@ void Lio::coast_to(Utime utime) {
     live_ = predict_nominal(live_, steady, 1e-6 * kCoastingStepUs, config_.gravity_m);
     live_.utime = sample.utime;
   }
+}
+
+/// Before the start nothing has to be deskewed or dead reckoned from further back either.
+void Lio::forget_old_samples() {
+  if (imu_.empty()) return;
+  imu_.forget_before((running_ ? filter_.nominal.utime : imu_.newest()) - kHistoryUs);
 }
 
 /// True while the filter's own samples, clipped or coasting, would teach the biases what is not so.

@@ -21,7 +21,8 @@ constexpr double kMostSensitivity = 0.2;
 
 void SecondOpinion::begin(Utime start) {
   forget();
-  silent_until_ = start + to_micros(kStartSeconds);
+  start_ends_ = start + to_micros(kStartSeconds);
+  silent_until_ = start_ends_;
 }
 
 void SecondOpinion::note_scan(const FilterState& corrected, const Eigen::Vector3d& velocity_correction,
@@ -42,7 +43,7 @@ std::optional<Contradiction> SecondOpinion::contradiction() {
   std::optional<Contradiction> found = largest();
   if (!found || found->sigmas < config_.contradiction_sigma) return std::nullopt;
   if (newest_ >= silent_until_) return found;
-  silent_until_ = newest_ + to_micros(kMovingSeconds);
+  if (newest_ < start_ends_) silent_until_ = newest_ + to_micros(kMovingSeconds);
   return std::nullopt;
 }
 

@@ -61,6 +61,7 @@ class SecondOpinion {
 
   FrontendConfig config_;
   std::vector<Mark> marks_;  ///< the last two seconds, ascending
+  Utime start_ends_ = 0;
   Utime silent_until_ = 0;
   Utime newest_ = 0;                                  ///< of the last scan
   Eigen::Matrix3d facing_ = Eigen::Matrix3d::Zero();  ///< running mean over half a second of scans
@@ -72,6 +73,7 @@ class SecondOpinion {
 
   friend void transfer(auto& io, FieldsOf<SecondOpinion> auto& opinion) {
     io.list(opinion.marks_);
+    io.number(opinion.start_ends_);
     io.number(opinion.silent_until_);
     io.number(opinion.newest_);
     io.matrix(opinion.facing_);

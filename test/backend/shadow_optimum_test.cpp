@@ -115,6 +115,17 @@ TEST(ShadowOptimum, OfAnotherGraphIsIgnored) {
   EXPECT_EQ(shorter.stats().shadow_swaps, 0);
 }
 
+TEST(ShadowOptimum, IsNoneWhenItIsNoLongerWanted) {
+  const testing::Drive drive = testing::make_drive({.seed = 3, .keyframes = 10});
+  Smoother smoother(without_search(), LoopGates());
+  extend(smoother, drive, 0, 10);
+  const ShadowProblem problem = smoother.shadow_problem();
+  std::stop_source source;
+  EXPECT_TRUE(solve(problem, source.get_token()).solved);
+  source.request_stop();
+  EXPECT_FALSE(solve(problem, source.get_token()).solved);
+}
+
 TEST(ShadowOptimum, OfAnEmptyGraphIsNone) {
   Smoother smoother(without_search(), LoopGates());
   const ShadowOptimum optimum = solve(smoother.shadow_problem());

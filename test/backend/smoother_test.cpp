@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -147,6 +148,19 @@ TEST(Smoother, LinksAcrossIdsThatNobodyCanSend) {
   }
   EXPECT_EQ(smoother.all_poses().back().id, 8);
   EXPECT_LT((smoother.all_poses().back().T_map_body.translation - drive.T_world_body[8].translation).norm(), 0.5);
+}
+
+TEST(Smoother, TakesNoKeyframeThatNoneCanFollow) {
+  constexpr std::int32_t kLast = std::numeric_limits<std::int32_t>::max();
+  const testing::Drive drive = testing::make_drive({.keyframes = 6});
+  Smoother smoother = filled(drive.keyframes, 5);
+  smoother.accept_gap_before(kLast);
+  Keyframe last = drive.keyframes[5];
+  last.id = kLast;
+  const SmootherUpdate update = smoother.add_keyframe(last);
+  EXPECT_EQ(update.verdict, KeyframeVerdict::kInvalid);
+  EXPECT_EQ(update.reason, "no id can follow this one");
+  EXPECT_EQ(smoother.expected_id(), kLast) << "there is none behind it";
 }
 
 TEST(Smoother, RefusesWhatIsNotFiniteAndStaysAsItWas) {

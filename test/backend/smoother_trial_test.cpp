@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
+#include <vector>
 
+#include "backend/loop_search.h"
 #include "backend/smoother.h"
 #include "backend/synthetic_drive.h"
 
@@ -176,6 +179,44 @@ TEST(LoopTrial, NeverBeginsForAVetoedPairAndItsNeighbours) {
   }
   EXPECT_TRUE(run.add_loop(27, 2, 0.0).loop->accepted());
   EXPECT_TRUE(run.add_loop(24, 5, 0.0).loop->accepted());
+}
+
+TEST(LoopTrial, AVetoThatIsKnownIsNotWrittenAgain) {
+  VagueDrive run;
+  static_cast<void>(run.smoother.take_change());
+  const std::size_t nothing = run.smoother.take_change().size();
+  static_cast<void>(run.smoother.veto_loop(24, 2));
+  const std::size_t veto = run.smoother.take_change().size();
+  EXPECT_GT(veto, nothing);
+  static_cast<void>(run.smoother.veto_loop(24, 2));
+  EXPECT_EQ(run.smoother.take_change().size(), nothing);
+  static_cast<void>(run.smoother.veto_loop(24, 3));
+  EXPECT_EQ(run.smoother.take_change().size(), veto) << "another pair is";
+}
+
+TEST(LoopTrial, AVetoOfNumbersThatNoGraphHoldsForbidsNothing) {
+  // Journals written before such commands were refused may hold them.
+  constexpr std::int32_t kSmallest = std::numeric_limits<std::int32_t>::min();
+  const std::vector<LoopVeto> vetoes{{24, kSmallest}, {kSmallest, 2}};
+  EXPECT_FALSE(is_vetoed(vetoes, 24, 0, 2));
+  EXPECT_FALSE(is_vetoed(vetoes, 0, 2, 2));
+}
+
+TEST(LoopTrial, OfMoreThanAHundredThatWaitTheOldestIsForgottenAndSaysSo) {
+  BackendConfig config = without_search();
+  config.loop_support_beyond_m = 0.5;
+  config.loop_support_apart_m = 10.0;
+  VagueDrive run(config);
+  ASSERT_EQ(run.add_loop(25, 3, 0.0).loop->reason, LoopReason::kNeedsSupport);
+  for (int i = 1; i < 100; ++i) EXPECT_TRUE(run.add_loop(24, 2, 0.0).changed.empty()) << i;
+  const SmootherUpdate update = run.add_loop(24, 2, 0.0);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 100);
+  ASSERT_EQ(update.changed.size(), 1U);
+  EXPECT_EQ(update.changed[0].from_id, 25);
+  EXPECT_EQ(update.changed[0].stage, LoopStage::kWithdrawn);
+  EXPECT_EQ(update.changed[0].reason, LoopReason::kNeedsSupport);
+  EXPECT_EQ(update.changed[0].reason_text, "forgotten: more than 100 loops wait");
+  EXPECT_EQ(update.loop->stage, LoopStage::kVerified);
 }
 
 TEST(LoopSearch, LeavesVetoedNeighbourhoodsAlone) {

@@ -17,18 +17,19 @@ TAKEN = f"""
 import json, time, lcm
 from ignis_lcm.ignis import health_t
 bus = lcm.LCM("{URL}")
-newest, taken = {{}}, {{}}
+newest, taken, told = {{}}, {{}}, {{}}
 def note(_, data):
     health = health_t.decode(data)
     name = f"{{health.process}} {{health.pid}}"
     newest[name] = [health.state, health.state_text]
+    told.setdefault(health.process, []).append(health.state_text)
     for channel, count in zip(health.channels, health.received):
         taken.setdefault(f"{{name}} {{channel}}", []).append([health.uptime_s, count])
 bus.subscribe("HEALTH", note)
 end = time.monotonic() + {LISTEN_S}
 while time.monotonic() < end:
     bus.handle_timeout(100)
-print(json.dumps([newest, taken]))
+print(json.dumps([newest, taken, told]))
 """
 # Repeats what a log of another day holds: HEALTH of the processes named on the command line, and inertial samples.
 PLAY = f"""
@@ -56,10 +57,11 @@ def start_driver(computer: Computer) -> subprocess.Popen:
 
 @dataclass
 class Heard:
-    """What HEALTH told for a while: the newest state and text of each process, and its counts over time."""
+    """What HEALTH told for a while: of each process the newest state and text, its counts over time, and all texts."""
 
     newest: dict[str, tuple[int, str]]
     counts: dict[str, list[tuple[float, int]]]
+    told: dict[str, list[str]]
 
     def of(self, name: str) -> tuple[int, str]:
         """State and text of the one process of this name."""
@@ -150,3 +152,28 @@ def test_fault_b7_who_plays_a_log_of_many_processes_is_named_and_still_heard(
     assert "two instances of l1_driver are on the bus" in text
     assert ("l1_driver 7 came later and is not listened to" in text) == ignored
     assert ("L1_IMU: " in text) != ignored, "what it sends is no message, which is told only of what is heard"
+
+
+def test_fault_b7_two_that_have_the_same_process_id_are_named_and_the_later_one_not_listened_to(
+    tmp_path: Path,
+) -> None:
+    computer = Computer(tmp_path)
+    try:
+        for words in (("link", "set", "lo", "up", "multicast", "on"), ("route", "add", "224.0.0.0/4", "dev", "lo")):
+            must(computer.run("ip", *words))
+        computer.start("lio_frontend", "--config", CONFIG, "--lcm-url", URL)
+        time.sleep(2.0)
+        players = []
+        for _ in range(2):
+            players.append(subprocess.Popen(computer.line(sys.executable, "-c", PLAY, "l1_driver")))
+            time.sleep(2.0)
+        heard = hear(computer)
+        for player in players:
+            player.terminate()
+            player.wait(10)
+    finally:
+        computer.close()
+    print(heard)
+    texts = heard.told["lio_frontend"]
+    assert any("two instances of l1_driver are on the bus (processes 7 at " in text for text in texts)
+    assert any("l1_driver 7 came later and is not listened to" in text for text in texts)

@@ -106,6 +106,15 @@ TEST(Checkpoint, AFrontEndThatWasReadBackGoesOnBitForBit) {
   }
 }
 
+TEST(Checkpoint, AResetLeavesNothingOfTheOldPlace) {
+  Lio used = driven_until(8.0);
+  used.reset();
+  Lio fresh(test::tuned_config(), 1);
+  feed(used, drive(), 0.0, 5.0);
+  feed(fresh, drive(), 0.0, 5.0);
+  EXPECT_TRUE(bytes_of(used) == bytes_of(fresh));
+}
+
 TEST(Checkpoint, TheFirstGoodPoseAfterAGapIsWhereTheVehicleIs) {
   for (const double at : {5.1, 8.4, 11.7, 15.2}) {
     for (const double gap : {0.2, 0.5, 1.0}) {

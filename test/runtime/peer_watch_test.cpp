@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "runtime/peer_watch.h"
 
+#include <cmath>
+#include <functional>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -102,6 +105,93 @@ TEST(Fault_B7, AllButTheOneThatHasLivedLongestAreLatecomers) {
   }
   EXPECT_EQ(watch.latecomers(3.1), (std::vector{peer("l1_driver", 100), peer("l1_driver", 300)}));
   EXPECT_TRUE(watch.latecomers(3.1 + PeerWatch::kForgetAfter_s).empty());
+}
+
+/// HEALTH of drivers, by process id when they were started and when they end, heard once a second from `from_s` on.
+struct Lives {
+  std::map<int, std::pair<double, double>> lives;
+
+  void tell(PeerWatch& watch, double from_s, double to_s, const std::function<void(double)>& look) const {
+    for (double now_s = from_s; now_s <= to_s; now_s += 0.5) {
+      for (const auto& [pid, life] : lives) {
+        const double lived_s = now_s - life.first;
+        if (lived_s >= 0.0 && now_s < life.second) watch.observe(peer("l1_driver", pid), now_s, lived_s);
+      }
+      look(now_s);
+    }
+  }
+};
+
+TEST(Fault_B7, AVehicleWhoseDriverIsStartedAnewGoesOnWithItAndNotWithTheLatecomer) {
+  PeerWatch watch(kSelf);
+  // 100 is ours, 200 came later; 100 dies and is followed by 300 a tenth of a second later.
+  const Lives drivers{{{100, {-60.0, 10.0}}, {200, {-5.0, 1e9}}, {300, {10.1, 1e9}}}};
+  drivers.tell(watch, 0.0, 30.0, [&](double now_s) {
+    if (now_s < 2.0) return;
+    EXPECT_EQ(watch.latecomers(now_s), std::vector{peer("l1_driver", 200)}) << now_s;
+  });
+}
+
+TEST(Fault_B7, ALatecomerThatIsAloneIsNone) {
+  PeerWatch watch(kSelf);
+  const Lives drivers{{{100, {-60.0, 10.0}}, {200, {-5.0, 1e9}}, {300, {20.0, 1e9}}}};
+  drivers.tell(watch, 0.0, 40.0, [&](double now_s) {
+    if (now_s > 13.0 && now_s < 21.0) {
+      EXPECT_TRUE(watch.latecomers(now_s).empty()) << now_s;
+    }
+    if (now_s > 22.0) {
+      EXPECT_EQ(watch.latecomers(now_s), std::vector{peer("l1_driver", 300)}) << now_s;
+    }
+  });
+}
+
+TEST(Fault_B7, OfTwoLatecomersTheOneThatHasLivedLongerGoesOnWhenTheRightOneIsGone) {
+  PeerWatch watch(kSelf);
+  const Lives drivers{{{100, {-60.0, 10.0}}, {200, {-5.0, 1e9}}, {300, {-9.0, 1e9}}}};
+  drivers.tell(watch, 0.0, 30.0, [&](double now_s) {
+    if (now_s > 2.0 && now_s < 10.0) {
+      EXPECT_EQ(watch.latecomers(now_s), (std::vector{peer("l1_driver", 200), peer("l1_driver", 300)})) << now_s;
+    }
+    if (now_s > 13.5) {
+      EXPECT_EQ(watch.latecomers(now_s), std::vector{peer("l1_driver", 200)}) << now_s;
+    }
+  });
+}
+
+TEST(Fault_B7, AnUptimeThatIsImpossibleSaysNothing) {
+  EXPECT_TRUE(PeerWatch::is_possible(0.0));
+  for (const double uptime_s : {std::nan(""), HUGE_VAL, -HUGE_VAL, -0.001}) {
+    EXPECT_FALSE(PeerWatch::is_possible(uptime_s)) << uptime_s;
+    PeerWatch watch(kSelf);
+    for (int i = 0; i < 3; ++i) {
+      watch.observe(peer("l1_driver", 8), i, i);
+      watch.observe(peer("l1_driver", 7), i, uptime_s);
+    }
+    EXPECT_EQ(watch.trouble(2.1), "") << uptime_s;
+  }
+}
+
+TEST(Fault_B7, TwoInstancesThatHaveTheSameProcessIdAreTwo) {
+  PeerWatch watch(kSelf);
+  PeerIdentity near = peer("l1_driver", 7);
+  PeerIdentity far = near;
+  near.sender = {.ip = 0x0A000001, .port = 4000};
+  far.sender = {.ip = 0x0A000002, .port = 4000};
+  for (int i = 0; i < 4; ++i) {
+    watch.observe(near, i, 60.0 + i);
+    watch.observe(far, i, 5.0 + i);
+  }
+  EXPECT_EQ(watch.trouble(3.1),
+            "two instances of l1_driver are on the bus (processes 7 at 10.0.0.1:4000 and 10.0.0.2:4000)");
+  EXPECT_EQ(watch.latecomers(3.1), std::vector{far});
+}
+
+TEST(Fault_B7, ASecondInstanceThatHasOurProcessIdIsNoneOfOurs) {
+  PeerWatch watch(kSelf);
+  PeerIdentity other = kSelf;
+  other.sender = {.ip = 0x0A000002, .port = 4000};
+  for (int i = 0; i < 3; ++i) watch.observe(other, i, i);
+  EXPECT_EQ(watch.trouble(2.1), "a second lio_frontend is on the bus (process 10)");
 }
 
 TEST(Fault_B7, AThirdThatHasJustEndedDoesNotHideTheOtherTwo) {
