@@ -9,9 +9,13 @@ namespace ignis {
 
 void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
   stats.utime = scan.end_utime();
-  // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
+  const Eigen::Vector3d& position = filter_.nominal.T_odom_body.translation;
+  const Eigen::Matrix3d in_map = cautious_.block<3, 3>(kPosition, kPosition);
+  const Eigen::Matrix3d since_start = in_map + drift_.shift_since_start(position);
   trust_.note_scan({.stats = stats,
-                    .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
+                    .position = position,
+                    .position_sigma = std::sqrt(in_map.diagonal().maxCoeff()),
+                    .sigma_since_start = std::sqrt(since_start.diagonal().maxCoeff()),
                     .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
                     .acceleration_sigma =
                         std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff())});
