@@ -31,11 +31,12 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   const std::optional<Contradiction> contradiction = opinion_.contradiction();
   if (!contradiction || imu_.samples().front().utime > contradiction->since.nominal.utime) return;
   FilterState alone = dead_reckoned(contradiction->since);
-  // The way that was not seen would be a step of the published pose: it becomes uncertainty.
+  // The way that was not seen would be a step of the published pose: it becomes uncertainty. Along all else scans have
+  // held the pose, and two seconds of dead reckoning are off by more than they find back from.
   const Eigen::Vector3d& d = contradiction->direction;
-  const Eigen::Vector3d missed =
-      d * d.dot(alone.nominal.T_odom_body.translation - filter_.nominal.T_odom_body.translation);
-  alone.nominal.T_odom_body.translation -= missed;
+  const Pose held = filter_.nominal.T_odom_body;
+  const Eigen::Vector3d missed = d * d.dot(alone.nominal.T_odom_body.translation - held.translation);
+  alone.nominal.T_odom_body = held;
   alone.covariance.block<3, 3>(kPosition, kPosition) += missed * missed.transpose();
   // Nor did scans teach the bias along it.
   const Eigen::Vector3d untaught = config_.accel_bias_sigma * (alone.nominal.T_odom_body.rotation.conjugate() * d);
