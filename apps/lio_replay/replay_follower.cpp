@@ -33,7 +33,7 @@ void ReplayFollower::take(const ScanResult& scan, double milliseconds) {
   if (!scan.has_state) return;
   follow_session(scan.stats.session);
   result_.odometry.push_back({scan.state.utime, scan.state.T_odom_body});
-  result_.states.push_back({scan.state, scan.covariance});
+  result_.states.push_back({scan.state, scan.covariance, scan.trust});
   if (scan.keyframe) take_keyframe(*scan.keyframe);
   map_timer_.time([&] { return map_.insert_scan(scan.cloud, scan.state.T_odom_body); });
 }

@@ -51,7 +51,8 @@ void append(std::string& row, const Eigen::Vector3d& values) {
 }
 
 /// Velocity, biases and covariance on the stamps of eskf.tum. Columns p00 to p55: upper triangle of the pose's, row by
-/// row, attitude (body axes) then position (odom axes); sigma_*: roots of the other variances.
+/// row, attitude (body axes) then position (odom axes); sigma_*: roots of the other variances; trust: 0 OK, 1 degraded,
+/// 2 lost.
 void write_states(const std::filesystem::path& file, const ReplayResult& result) {
   FileOutput output(file);
   output.stream() << "utime";
@@ -61,8 +62,8 @@ void write_states(const std::filesystem::path& file, const ReplayResult& result)
   for (int i = 0; i < 6; ++i) {
     for (int k = i; k < 6; ++k) output.stream() << std::format(",p{}{}", i, k);
   }
-  output.stream() << '\n';
-  for (const auto& [state, covariance] : result.states) {
+  output.stream() << ",trust\n";
+  for (const auto& [state, covariance, trust] : result.states) {
     std::string row = std::to_string(state.utime);
     append(row, state.v_odom);
     append(row, state.gyro_bias);
@@ -73,7 +74,7 @@ void write_states(const std::filesystem::path& file, const ReplayResult& result)
     for (int i = 0; i < 6; ++i) {
       for (int k = i; k < 6; ++k) row += std::format(",{:.9g}", covariance(i, k));
     }
-    output.stream() << row << '\n';
+    output.stream() << row << std::format(",{}\n", static_cast<int>(trust));
   }
   output.commit();
 }

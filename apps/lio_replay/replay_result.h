@@ -17,6 +17,7 @@ namespace ignis {
 struct UncertainState {
   NavState state;
   Matrix15d covariance;
+  Trust trust;
 };
 
 /// Everything that a replay produces, before it becomes files.

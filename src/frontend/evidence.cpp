@@ -9,9 +9,13 @@ namespace ignis {
 
 void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
   stats.utime = scan.end_utime();
-  // In the map, without its drift: a start that was not level shifts what lies far off, but loses nobody.
+  const Eigen::Vector3d& position = filter_.nominal.T_odom_body.translation;
+  const Eigen::Matrix3d in_map = cautious_.block<3, 3>(kPosition, kPosition);
+  const Eigen::Matrix3d since_start = in_map + drift_.shift_since_start(position);
   trust_.note_scan({.stats = stats,
-                    .position_sigma = std::sqrt(cautious_.diagonal().segment<3>(kPosition).maxCoeff()),
+                    .position = position,
+                    .position_sigma = std::sqrt(in_map.diagonal().maxCoeff()),
+                    .sigma_since_start = std::sqrt(since_start.diagonal().maxCoeff()),
                     .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
                     .acceleration_sigma =
                         std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff())});
@@ -27,11 +31,12 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   const std::optional<Contradiction> contradiction = opinion_.contradiction();
   if (!contradiction || imu_.samples().front().utime > contradiction->since.nominal.utime) return;
   FilterState alone = dead_reckoned(contradiction->since);
-  // The way that was not seen would be a step of the published pose: it becomes uncertainty.
+  // The way that was not seen would be a step of the published pose: it becomes uncertainty. Along all else scans have
+  // held the pose, and two seconds of dead reckoning are off by more than they find back from.
   const Eigen::Vector3d& d = contradiction->direction;
-  const Eigen::Vector3d missed =
-      d * d.dot(alone.nominal.T_odom_body.translation - filter_.nominal.T_odom_body.translation);
-  alone.nominal.T_odom_body.translation -= missed;
+  const Pose held = filter_.nominal.T_odom_body;
+  const Eigen::Vector3d missed = d * d.dot(alone.nominal.T_odom_body.translation - held.translation);
+  alone.nominal.T_odom_body = held;
   alone.covariance.block<3, 3>(kPosition, kPosition) += missed * missed.transpose();
   // Nor did scans teach the bias along it.
   const Eigen::Vector3d untaught = config_.accel_bias_sigma * (alone.nominal.T_odom_body.rotation.conjugate() * d);

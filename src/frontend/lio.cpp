@@ -263,6 +263,7 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation,
                   blind_shifts(match.degeneracy));
   result.covariance = published.covariance.topLeftCorner<15, 15>();
+  result.trust = trust_.trust();
   if (velocity_known_) {
     result.keyframe =
         keyframer_.add_scan(published, match.information_body, std::move(sparse), !trust_.awaits_confirmation());

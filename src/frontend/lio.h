@@ -30,7 +30,8 @@ struct ScanResult {
   bool has_state = false;  ///< false before the start; then only `stats` means anything
   NavState state;          ///< at the scan's end, frame odom
   Matrix15d covariance = Matrix15d::Identity();
-  std::vector<CloudPoint> cloud;  ///< deskewed, in range, body frame at the scan's end
+  Trust trust = Trust::kDegraded;  ///< in that state
+  std::vector<CloudPoint> cloud;   ///< deskewed, in range, body frame at the scan's end
   std::optional<Keyframe> keyframe;
 };
 

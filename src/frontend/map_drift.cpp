@@ -121,6 +121,10 @@ void MapDrift::widen_to(const Eigen::Matrix3d& position_covariance, const Eigen:
   }
 }
 
+Eigen::Matrix3d MapDrift::shift_since_start(const Eigen::Vector3d& position) const {
+  return at(position).bottomRightCorner<3, 3>() - shift_by_tilt(position);
+}
+
 Matrix6d MapDrift::pose_covariance(const Pose& T_odom_body) const {
   const Matrix6d turn = attitude_to_odom(T_odom_body);
   return turn.transpose() * at(T_odom_body.translation) * turn;

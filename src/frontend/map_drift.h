@@ -61,6 +61,10 @@ class MapDrift {
   /// than it was when they were placed.
   void hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body);
 
+  /// [m^2] odom axes: what a position is uncertain by beyond that, against the first pose. The tilt of the start does
+  /// not count: it turns all alike and loses nobody.
+  [[nodiscard]] Eigen::Matrix3d shift_since_start(const Eigen::Vector3d& position) const;
+
   /// What a pose is uncertain by beyond its covariance in the map; order of ErrorBlock.
   [[nodiscard]] Matrix6d pose_covariance(const Pose& T_odom_body) const;
 

@@ -21,12 +21,18 @@ enum class Trust : std::int8_t { kOk = 0, kDegraded = 1, kLost = 2 };
 /// What one scan did to the filter, as far as trust is concerned.
 struct ScanEvidence {
   ScanStats stats;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();             ///< [m] odom
   double position_sigma = 0.0;                                    ///< [m] largest of the position in the map
+  double sigma_since_start = 0.0;                                 ///< [m] the same against the first pose
   Eigen::Vector3d velocity_correction = Eigen::Vector3d::Zero();  ///< [m/s] odom axes, zero when not applied
   double acceleration_sigma = 0.0;  ///< [m/s^2] of the acceleration that the IMU is believed to feel, largest axis
 };
 
 /// Judges from scans and stamps alone whether the pose may be trusted, and says why not.
+///
+/// A map that was shifted along with a pose while nothing held it fits as well as any, and the pose is known in it to a
+/// centimetre. So what the position is uncertain by against the first pose counts as well. That grows with the way on
+/// every drive, and a little with each metre is no reason for doubt.
 ///
 /// One of the signals is a second opinion: returns that travel with the vehicle, or a tunnel that looks the same
 /// everywhere, give well-conditioned scans that all say "no motion". Each such scan takes a little of the velocity that
@@ -68,6 +74,8 @@ class TrustMonitor {
   [[nodiscard]] double seconds_without_imu() const;
   [[nodiscard]] double seconds_without_scan() const;
   [[nodiscard]] bool is_out_of_sight() const;
+  void follow(const Eigen::Vector3d& position);
+  [[nodiscard]] double usual_sigma() const;
 
   FrontendConfig config_;
   std::optional<Utime> newest_imu_;
@@ -83,6 +91,9 @@ class TrustMonitor {
   bool contradicted_ = false;  ///< scans by the IMU, and not yet confirmed
   int losses_ = 0;
   double position_sigma_ = 0.0;
+  double sigma_since_start_ = 0.0;
+  double driven_m_ = 0.0;                           ///< metre by metre: what a vehicle that stands jitters by is no way
+  Eigen::Vector3d mark_ = Eigen::Vector3d::Zero();  ///< [m] odom, where the last of them ended
   double acceleration_sigma_ = 0.0;
   std::deque<Correction> corrections_;
 
@@ -104,6 +115,9 @@ class TrustMonitor {
     io.number(monitor.contradicted_);
     io.number(monitor.losses_);
     io.number(monitor.position_sigma_);
+    io.number(monitor.sigma_since_start_);
+    io.number(monitor.driven_m_);
+    io.matrix(monitor.mark_);
     io.number(monitor.acceleration_sigma_);
     io.list(monitor.corrections_);
   }

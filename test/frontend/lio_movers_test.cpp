@@ -67,5 +67,31 @@ TEST(LioMovers, AForkliftThatComesTheOtherWayDoesNotTakeTheVehicleWithIt) {
   }
 }
 
+/// A forklift that goes ahead at the vehicle's own pace holds it, where nothing else faces along the way, until the IMU
+/// is heard.
+TEST(LioMovers, WhenTheImuIsHeardOnlyWhatWasHeldIsDeadReckoned) {
+  test::World world;
+  world.room = aisle().room;
+  world.movers = {forklift(0.0, -5.0, -kSpeed, kRest)};
+  test::Sensors sensors;
+  sensors.range_sigma = 0.02;
+  const test::Drive drive = test::simulate(world, test::straight_drive(kRest, kSpeed), 9.0, sensors, 1);
+  const test::LioRun run = test::run_lio(test::tuned_config(), drive);
+  double changed = 0.0;  // m/s along the way, at once
+  double across = 0.0;   // m, largest step from scan to scan that is none of the drive
+  for (std::size_t i = 1; i < run.scans.size(); ++i) {
+    const ScanResult& last = run.scans[i - 1];
+    const ScanResult& scan = run.scans[i];
+    if (!last.has_state || !scan.has_state) continue;
+    const auto off = [&](const ScanResult& at) -> Eigen::Vector3d {
+      return at.state.T_odom_body.translation - drive.truth(test::drive_seconds(drive, at.state.utime)).translation;
+    };
+    changed = std::max(changed, std::abs(last.state.v_odom.z() - scan.state.v_odom.z()));
+    across = std::max(across, (off(scan) - off(last)).head<2>().norm());
+  }
+  EXPECT_GT(changed, 0.3) << "else nobody was heard";
+  EXPECT_LT(across, 0.03) << "walls and floor held the rest all the time";
+}
+
 }  // namespace
 }  // namespace ignis

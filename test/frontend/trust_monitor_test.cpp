@@ -84,6 +84,33 @@ TEST(TrustMonitor, APoseThatIsNotKnownIsNotOk) {
   EXPECT_EQ(feed.monitor.trust(), Trust::kLost);
 }
 
+TEST(TrustMonitor, APoseThatCameOffOnTheWayIsNotOkThoughTheMapHoldsIt) {
+  Feed feed;
+  feed.evidence.sigma_since_start = 0.6;
+  feed.run(100);
+  expect(feed.monitor, Trust::kDegraded, "position sigma since the start 0.60 m (limit 0.15)");
+}
+
+TEST(TrustMonitor, WhatEveryDriveGathersByAndByIsNoReasonForDoubt) {
+  Feed feed;
+  for (int metre = 1; metre <= 2000; ++metre) {
+    feed.evidence.position.z() = -metre;
+    feed.evidence.sigma_since_start = 1.5e-4 * metre;
+    feed.run(1);
+    ASSERT_EQ(feed.monitor.trust(), Trust::kOk) << metre;
+  }
+}
+
+TEST(TrustMonitor, StandingIsNoWay) {
+  Feed feed;
+  feed.evidence.sigma_since_start = 0.2;
+  for (int i = 0; i < 20'000; ++i) {
+    feed.evidence.position.x() = i % 2 == 0 ? 0.0 : 0.1;
+    feed.run(1);
+  }
+  EXPECT_EQ(feed.monitor.trust(), Trust::kDegraded);
+}
+
 TEST(TrustMonitor, ASilentImuDegradesWithin100MsAndIsForgivenTenScansAfterItsReturn) {
   Feed feed;
   feed.imu = false;

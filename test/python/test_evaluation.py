@@ -9,7 +9,7 @@ import pytest
 
 from ignis.errors import InputError
 from ignis.evaluate import Row, Variant, table
-from ignis.evaluation.consistency import band, nees_of
+from ignis.evaluation.consistency import band, nees_of, silent_percent
 from ignis.evaluation.drives import Simulation, changed_scene
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, write_tum
 
@@ -61,6 +61,22 @@ def test_nees_is_the_square_of_how_much_larger_the_errors_are(tmp_path: Path) ->
     assert attitude == pytest.approx(9.0, rel=0.25)
 
 
+def test_a_pose_that_is_off_and_said_to_be_ok_is_silent(tmp_path: Path) -> None:
+    """Ten scans a metre off: five are reported as OK, three as degraded, two as lost; the ninety others are right."""
+    utime = np.arange(100) * 50_000 + 1_000_000
+    true_position = np.stack([np.zeros(100), np.zeros(100), -0.05 * np.arange(100)], axis=1)
+    level = np.tile([1.0, 0.0, 0.0, 0.0], (100, 1))
+    position = true_position.copy()
+    position[40:50, 0] += 1.0
+    trust = np.zeros(100, dtype=int)
+    trust[40:43], trust[43:45], trust[80:90] = 1, 2, 1
+    write_tum(tmp_path / "eskf.tum", Trajectory(utime, Poses(position, level)))
+    rows = [f"{t},{value}" for t, value in zip(utime, trust, strict=True)]
+    (tmp_path / "eskf_states.csv").write_text("\n".join(["utime,trust", *rows]) + "\n")
+    truth = Trajectory(utime, Poses(true_position, level))
+    assert silent_percent(tmp_path, truth) == pytest.approx(5.0)
+
+
 def test_band_narrows_with_the_number_of_drives() -> None:
     few, many = band(3), band(60)
     assert few[0] < many[0] < 1.0 < many[1] < few[1]
@@ -86,7 +102,16 @@ def test_changed_scene_keeps_its_geometry_within_reach(tmp_path: Path) -> None:
 def test_table_lists_drives_in_order_and_means_over_seeds() -> None:
     def row(seed: int, nees: float) -> Row:
         figures = dict.fromkeys(
-            ("ate_m", "smoothed_ate_m", "drift_percent", "applied_percent", "named_percent", "scan_p50_ms"), 0.5
+            (
+                "ate_m",
+                "smoothed_ate_m",
+                "drift_percent",
+                "silent_percent",
+                "applied_percent",
+                "named_percent",
+                "scan_p50_ms",
+            ),
+            0.5,
         )
         figures |= {"rpe_10m_m": None, "loops": 2, "nees_position": nees, "nees_attitude": 1.0, "scan_p99_ms": 2.0}
         return Row(Simulation("hall", seed, Path("a"), Path("b")), Variant("plain"), figures)

@@ -11,9 +11,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, read_tum, rotation_matrix
-from ignis.trajectory_error import paired
+from ignis.trajectory_error import aligned_at_start, paired, position_errors
 
 BAND = 0.95
+SILENT_M = 0.5  # a pose that is farther off and reported as OK
+_OK = 0
 
 
 def band(degrees: int) -> tuple[float, float]:
@@ -34,6 +36,17 @@ def read_pose_covariances(file: Path) -> np.ndarray:
     covariance[:, row, column] = upper
     covariance[:, column, row] = upper
     return covariance
+
+
+def silent_percent(folder: Path, truth: Trajectory) -> float:
+    """[%] Scans whose pose was reported as OK while it was SILENT_M off, the first poses laid on each other."""
+    estimate = read_tum(folder / "eskf.tum")
+    with (folder / "eskf_states.csv").open(newline="") as stream:
+        trust = np.array([int(row["trust"]) for row in csv.DictReader(stream)])
+    pair = paired(estimate, truth)
+    trust = trust[np.isin(estimate.utime, pair.estimate.utime)]
+    off = position_errors(aligned_at_start(pair), pair.truth) > SILENT_M
+    return float(100.0 * np.mean(off & (trust == _OK)))
 
 
 def nees_of(folder: Path, truth: Trajectory) -> tuple[float, float]:
