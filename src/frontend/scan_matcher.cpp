@@ -8,7 +8,6 @@
 
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
-#include "frontend/plane_fits.h"
 #include "frontend/square_sum.h"
 
 namespace ignis {
@@ -61,11 +60,8 @@ double largest_sigma(const ErrorCovariance& covariance, ErrorBlock block) {
 
 }  // namespace
 
-ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), wide_config_(config) {
+ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), plane_finder_(config) {
   config::require_valid(config, "frontend");
-  // A wide neighbourhood reaches round corners and over tree crowns: it has to be flatter to count as a plane.
-  wide_config_.max_surface_roughness *= 0.5;
-  wide_config_.max_curvature /= 3.0;
 }
 
 MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start,
@@ -114,9 +110,9 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
     const auto points = points_body.subspan(begin, std::min(kPointsTogether, points_body.size() - begin));
     queries_.clear();
     for (const Eigen::Vector3f& point : points) queries_.emplace_back(R * point.cast<double>() + pose.translation);
-    find_planes(map, pose.translation);
+    const std::span<const PlaneFit> planes = plane_finder_.find(map, queries_, pose.translation);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const PlaneFit& plane = planes_[i];
+      const PlaneFit& plane = planes[i];
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
       const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
@@ -147,48 +143,6 @@ void ScanMatcher::leave_out_new_surfaces(int newest_scan) {
   const double needed =
       std::max(kLeastSettledShare * static_cast<double>(constraints_.size()), static_cast<double>(config_.min_matches));
   if (static_cast<double>(settled) >= needed) std::erase_if(constraints_, is_new);
-}
-
-void ScanMatcher::find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from) {
-  planes_.resize(queries_.size());
-  chosen_.clear();
-  for (std::size_t i = 0; i < queries_.size(); ++i) chosen_.push_back(i);
-  fit_chosen(map, seen_from, config_, config_.match_radius_m);
-  // Far surfaces are sparse: a small neighbourhood keeps edges sharp where the map is dense, a wide one finds planes
-  // where it is not.
-  const double radius = config_.wide_match_radius_m;
-  if (!(radius > 0.0)) return;
-  chosen_.clear();
-  for (std::size_t i = 0; i < planes_.size(); ++i) {
-    if (planes_[i].verdict == PlaneVerdict::kTooFewPoints) chosen_.push_back(i);
-  }
-  fit_chosen(map, seen_from, wide_config_, radius);
-}
-
-/// Planes of the chosen queries. Where one was seen from its other side, it is that of the points seen from this side.
-void ScanMatcher::fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config,
-                             double radius) {
-  const auto fit = [&](std::span<const Eigen::Vector3d> sides) {
-    chosen_queries_.clear();
-    for (const std::size_t i : chosen_) chosen_queries_.push_back(queries_[i]);
-    chosen_planes_.clear();
-    for (const std::size_t i : chosen_) chosen_planes_.push_back(&planes_[i]);
-    std::span<PlaneFit* const> left = chosen_planes_;
-    for (const FourMoments& moments : search_.gather(map, chosen_queries_, radius, sides)) {
-      const auto four = left.first(std::min<std::size_t>(kLanes, left.size()));
-      fit_planes(moments, config, radius, four);
-      left = left.subspan(four.size());
-    }
-  };
-  fit({});
-  sides_.clear();
-  std::erase_if(chosen_, [&](std::size_t i) {
-    const Eigen::Vector3d view = seen_from - queries_[i];
-    const bool other = is_seen_from_other_side(planes_[i], view);
-    if (other) sides_.push_back(planes_[i].normal.dot(view) > 0.0 ? planes_[i].normal : -planes_[i].normal);
-    return !other;
-  });
-  if (!chosen_.empty()) fit(sides_);
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {

@@ -10,7 +10,7 @@
 #include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
 #include "frontend/local_map.h"
-#include "frontend/neighbour_search.h"
+#include "frontend/plane_finder.h"
 #include "frontend/plane_fit.h"
 #include "frontend/salient_points.h"
 #include "frontend/scan_stats.h"
@@ -81,9 +81,6 @@ class ScanMatcher {
   /// a forklift that goes by can be most of what faces along the way, and it says what its own speed is. What stands is
   /// new only when it has just come into sight. A vehicle that does not know its own speed sees all that stands move.
   void leave_out_new_surfaces(int newest_scan);
-  /// Replaces planes_ by those nearest to queries_.
-  void find_planes(const LocalMap& map, const Eigen::Vector3d& seen_from);
-  void fit_chosen(const LocalMap& map, const Eigen::Vector3d& seen_from, const FrontendConfig& config, double radius);
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);
@@ -106,14 +103,8 @@ class ScanMatcher {
                                  const MatchResult& result) const;
 
   FrontendConfig config_;
-  FrontendConfig wide_config_;  ///< gates of planes in the wide neighbourhood
-  NeighbourSearch search_;
+  PlaneFinder plane_finder_;
   std::vector<Eigen::Vector3d> queries_;  ///< [m] odom frame; of some points
-  std::vector<PlaneFit> planes_;          ///< [query]
-  std::vector<std::size_t> chosen_;       ///< those of queries_ that planes are sought for
-  std::vector<Eigen::Vector3d> chosen_queries_;
-  std::vector<PlaneFit*> chosen_planes_;  ///< those of planes_ that go with them
-  std::vector<Eigen::Vector3d> sides_;    ///< normals that point to the side that they are seen from
   std::vector<Constraint> constraints_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;
