@@ -4,9 +4,11 @@
 #include <gtsam/geometry/Pose3.h>
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/linear/linearExceptions.h>
-#include <gtsam/nonlinear/Marginals.h>
+#include <gtsam/nonlinear/NonlinearFactorGraph.h>
+#include <gtsam/nonlinear/Values.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/unordered/unordered_flat_set.hpp>
 #include <cmath>
 #include <format>
@@ -270,19 +272,15 @@ std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint6
 }
 
 std::vector<Matrix6d> IncrementalSolver::relative_covariances(
-    std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs) {
+    std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs) const {
+  if (!impl_->broken.empty()) return {};
+  const gtsam::Values& values = impl_->isam.linearisation_points();
   std::vector<Matrix6d> covariances;
-  try {
-    const gtsam::Values& values = estimate();
-    const gtsam::Marginals marginals(living_factors(), values);
-    for (const auto& [from, to] : pairs) {
-      const gtsam::JointMarginal joint = marginals.jointMarginalCovariance({from, to});
-      const gtsam::Matrix6 A = -values.at<gtsam::Pose3>(to).between(values.at<gtsam::Pose3>(from)).AdjointMap();
-      const gtsam::Matrix6 cross = A * joint(from, to);
-      covariances.emplace_back(A * joint(from, from) * A.transpose() + joint(to, to) + cross + cross.transpose());
-    }
-  } catch (const std::exception&) {
-    return {};
+  for (const auto& [from, to] : pairs) {
+    const gtsam::Matrix6 A = -values.at<gtsam::Pose3>(to).between(values.at<gtsam::Pose3>(from)).AdjointMap();
+    const std::array<Isam2::Term, 2> terms{Isam2::Term{from, A}, Isam2::Term{to, gtsam::I_6x6}};
+    covariances.emplace_back(impl_->isam.covariance(terms));
+    if (!covariances.back().allFinite()) return {};
   }
   return covariances;
 }

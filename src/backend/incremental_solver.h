@@ -100,10 +100,10 @@ class IncrementalSolver {
   /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
   [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
 
-  /// Covariances of the relative poses of pairs of pose variables, in body axes of the second of each, by one batch
-  /// elimination: tens of milliseconds for hundreds of poses. Empty when they cannot be computed.
+  /// Covariances of the relative poses of pairs of pose variables, in body axes of the second of each, where the
+  /// factors are linearised. Empty when they cannot be computed.
   [[nodiscard]] std::vector<Matrix6d> relative_covariances(
-      std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs);
+      std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs) const;
 
   /// The factors in the graph. They are immutable, so copies of the list share them.
   [[nodiscard]] gtsam::NonlinearFactorGraph living_factors() const;

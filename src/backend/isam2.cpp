@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <ranges>
 
 #include "backend/elimination_plan.h"
 
@@ -339,18 +340,40 @@ bool Isam2::solve(const Clique& at, double threshold) {
 }
 
 Eigen::MatrixXd Isam2::covariance(gtsam::Key key) const {
-  // With the information L L', the covariance of a variable is Y'Y, where L Y = E and E picks the variable. Y is zero
-  // but for the variables on the way from it to the root.
-  const int wanted = number_of_.at(key);
-  const int size = dimension(wanted);
+  const int size = dimension(number_of_.at(key));
+  const Term whole{key, Eigen::MatrixXd::Identity(size, size)};
+  return covariance(std::span(&whole, 1));
+}
+
+std::vector<int> Isam2::way_to_roots(std::span<const Term> terms) const {
+  std::vector<std::vector<int>> ways;
+  std::vector<bool> passed(cliques_.size(), false);
+  for (const Term& term : terms) {
+    std::vector<int>& way = ways.emplace_back();
+    for (int at = variable(number_of_.at(term.key)).clique; at >= 0 && !passed[static_cast<std::size_t>(at)];
+         at = clique(at).parent) {
+      passed[static_cast<std::size_t>(at)] = true;
+      way.push_back(at);
+    }
+  }
+  // A later way ends below a clique of an earlier one, so it comes first.
+  std::vector<int> all;
+  for (const std::vector<int>& way : ways | std::views::reverse) all.insert(all.end(), way.begin(), way.end());
+  return all;
+}
+
+Eigen::MatrixXd Isam2::covariance(std::span<const Term> terms) const {
+  // With the information L L', the covariance of F' x is Y'Y, where L Y = F. Y is zero but for the variables on the way
+  // from those of F to the roots.
+  const Eigen::Index size = terms.front().factor.rows();
   std::vector<double> open_rows(delta_.size() * static_cast<std::size_t>(size), 0.0);
   const auto open = [&](int number) {
     return Eigen::Map<Eigen::MatrixXd>(&open_rows[variable(number).offset * static_cast<std::size_t>(size)],
                                        dimension(number), size);
   };
-  open(wanted).setIdentity();
+  for (const Term& term : terms) open(number_of_.at(term.key)) = term.factor.transpose();
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
-  for (int number = variable(wanted).clique; number >= 0; number = clique(number).parent) {
+  for (const int number : way_to_roots(terms)) {
     const Clique& at = clique(number);
     const std::span<const int> variables = at.variables;
     const Eigen::Index frontal_rows = at.conditional.cols();

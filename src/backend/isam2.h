@@ -61,6 +61,15 @@ class Isam2 {
   /// Covariance in the tangent space of the linearisation point. The variable must exist.
   [[nodiscard]] Eigen::MatrixXd covariance(gtsam::Key key) const;
 
+  /// A variable's part in a sum: its offset times `factor`.
+  struct Term {
+    gtsam::Key key = 0;
+    Eigen::MatrixXd factor;
+  };
+  /// Covariance of a sum of terms of different variables, which must exist: of a relative pose, for example. Costs the
+  /// way from these variables to the roots.
+  [[nodiscard]] Eigen::MatrixXd covariance(std::span<const Term> terms) const;
+
   /// Scalars of quadratic forms that wait for the next elimination, and of conditionals.
   struct Size {
     std::size_t cliques = 0;
@@ -135,6 +144,9 @@ class Isam2 {
   std::vector<int> back_substitute();
   /// Solves for the clique's variables; false, and nothing done, when none changes by `threshold`.
   bool solve(const Clique& clique, double threshold);
+
+  /// The cliques from those of `terms` to the roots, children before parents.
+  [[nodiscard]] std::vector<int> way_to_roots(std::span<const Term> terms) const;
 
   Isam2Settings settings_;
   int updates_ = 0;

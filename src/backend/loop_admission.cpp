@@ -43,8 +43,7 @@ class Hearing {
       std::ranges::sort(witnesses, {}, &GraphLoop::number);
       witnesses.erase(witnesses.begin(), witnesses.end() - kMostWitnesses);
     }
-    // Pairs of loops that testify no more are never asked for again.
-    if (state_.agreement.size() > kMostWitnesses * kMostWitnesses) state_.agreement.clear();
+    forget_old_pairs(witnesses);
     for (const GraphLoop* loop : witnesses) {
       numbers_.push_back(loop->number);
       claims_.push_back(claim_of(*loop, state_));
@@ -89,6 +88,18 @@ class Hearing {
       return state_.odometry.T_from_to(i, k).translation.norm();
     };
     return std::min(distance(a.from, b.from), distance(a.to, b.to)) >= config_.loop_support_apart_m;
+  }
+
+  /// Pairs with a loop that testifies no more are hardly ever asked for again.
+  void forget_old_pairs(const std::vector<const GraphLoop*>& witnesses) {
+    if (state_.agreement.size() <= kMostWitnesses * kMostWitnesses) return;
+    std::vector<std::uint64_t> numbers;
+    for (const GraphLoop* loop : witnesses) numbers.push_back(static_cast<std::uint64_t>(loop->number));
+    std::ranges::sort(numbers);
+    const auto testifies = [&](std::uint64_t number) { return std::ranges::binary_search(numbers, number); };
+    boost::unordered::erase_if(state_.agreement, [&](const auto& pair) {
+      return !testifies(pair.first >> 32U) || !testifies(pair.first & 0xFFFFFFFFU);
+    });
   }
 
   bool agree(std::size_t i, std::size_t k) {

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <boost/dynamic_bitset.hpp>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <numeric>
@@ -70,16 +71,21 @@ std::vector<std::size_t> largest_agreeing_set(const std::vector<std::vector<bool
   std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
     return degree[a] != degree[b] ? degree[a] > degree[b] : cost[a] < cost[b];
   });
+  // By place in that order, so that who may still join is a row of bits and the next one its lowest.
+  std::vector<boost::dynamic_bitset<>> agreeing(count, boost::dynamic_bitset<>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < count; ++k) agreeing[i][k] = i != k && agree[order[i]][order[k]];
+  }
   std::vector<std::size_t> best;
   double best_cost = 0.0;
-  for (const std::size_t start : order) {
-    std::vector<std::size_t> set = {start};
-    double set_cost = cost[start];
-    for (const std::size_t i : order) {
-      const bool with_all = i != start && std::ranges::all_of(set, [&](std::size_t k) { return agree[i][k]; });
-      if (!with_all) continue;
-      set.push_back(i);
-      set_cost += cost[i];
+  for (std::size_t start = 0; start < count; ++start) {
+    std::vector<std::size_t> set = {order[start]};
+    double set_cost = cost[order[start]];
+    boost::dynamic_bitset<> with_all = agreeing[start];
+    for (std::size_t i = with_all.find_first(); i < count; i = with_all.find_next(i)) {
+      set.push_back(order[i]);
+      set_cost += cost[order[i]];
+      with_all &= agreeing[i];
     }
     if (set.size() < best.size() || (set.size() == best.size() && set_cost >= best_cost)) continue;
     best = std::move(set);

@@ -5,6 +5,7 @@
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/nonlinear/Values.h>
 
+#include "backend/axis_doubt.h"
 #include "backend/gtsam_conversion.h"
 #include "backend/keyframe_factors.h"
 
@@ -61,7 +62,7 @@ void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUp
   update.newest.angular_rate = state.angular_rate;
   if (!update.accepted()) return;
   if (const auto covariance = solver.marginal_covariance(X(end.id))) {
-    update.covariance = *covariance;
+    update.covariance = with_axis_doubt(*covariance);
     update.covariance_valid = true;
   }
   list_moved(state, update);

@@ -9,6 +9,7 @@
 #include <gtsam/slam/BetweenFactor.h>
 
 #include <algorithm>
+#include <array>
 #include <random>
 
 #include "backend/elimination_plan.h"
@@ -135,6 +136,25 @@ TEST(Isam2, KnowsTheCovarianceOfEachVariable) {
   const gtsam::Marginals batch(twins.theirs.getFactorsUnsafe(), twins.ours.linearisation_points());
   for (int i = 0; i < 40; ++i) {
     EXPECT_TRUE(twins.ours.covariance(X(i)).isApprox(batch.marginalCovariance(X(i)), 1e-9)) << i;
+  }
+}
+
+TEST(Isam2, KnowsTheCovarianceOfASumOfVariables) {
+  Twins twins(1, 1);
+  for (int i = 0; i < 40; ++i) twins.append(i);
+  twins.close(39, 18);
+  const gtsam::Marginals batch(twins.theirs.getFactorsUnsafe(), twins.ours.linearisation_points());
+  gtsam::Matrix6 turn = gtsam::Matrix6::Zero();
+  turn.topRightCorner<3, 3>().setIdentity();
+  turn.bottomLeftCorner<3, 3>() = -2.0 * gtsam::I_3x3;
+  // Neighbours, ends of a loop, one above the other in the tree and far apart; both ways round.
+  for (const auto& [a, b] : {std::pair(3, 4), {39, 18}, {18, 39}, {0, 39}, {25, 5}}) {
+    const std::array<Isam2::Term, 2> terms{Isam2::Term{X(a), turn}, Isam2::Term{X(b), gtsam::I_6x6}};
+    const gtsam::JointMarginal joint = batch.jointMarginalCovariance({X(a), X(b)});
+    const gtsam::Matrix6 cross = turn * joint(X(a), X(b));
+    const gtsam::Matrix6 expected =
+        turn * joint(X(a), X(a)) * turn.transpose() + joint(X(b), X(b)) + cross + cross.transpose();
+    EXPECT_TRUE(twins.ours.covariance(terms).isApprox(expected, 1e-8)) << a << ' ' << b;
   }
 }
 
