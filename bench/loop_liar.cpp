@@ -51,7 +51,7 @@ class Liar {
   }
 
  private:
-  [[nodiscard]] int count() const { return static_cast<int>(drive_.keyframes.size()); }
+  [[nodiscard]] int count() const { return static_cast<int>(drive_.T_world_body.size()); }
   [[nodiscard]] const Pose& truth(int i) const { return drive_.T_world_body[static_cast<std::size_t>(i)]; }
 
   [[nodiscard]] int nearest_before(int from, const Eigen::Vector3d& place) const {

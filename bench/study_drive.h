@@ -25,7 +25,4 @@ struct StudyDrive {
 /// Five laps of the synthetic drive of test/backend, with a true loop at every second keyframe from the second lap on.
 [[nodiscard]] StudyDrive synthetic_study(unsigned seed);
 
-/// [m] Root mean square distance of positions after the best rigid alignment.
-[[nodiscard]] double aligned_error(const std::vector<Pose>& estimate, const std::vector<Pose>& truth);
-
 }  // namespace ignis::bench
