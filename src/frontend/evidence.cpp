@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What Lio makes of a scan once the filter has taken it: how far the pose can be trusted, and whether the IMU agrees.
+// What Lio makes of a scan once the filter has taken it: how far the pose can be trusted, whether the IMU agrees, and
+// whether the vehicle stands.
 #include <cmath>
 
 #include "frontend/lio.h"
+#include "frontend/standstill.h"
 
 namespace ignis {
 
@@ -46,6 +48,22 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   matcher_.distrust_weak_shifts();
   opinion_.forget();
   trust_.note_contradiction();
+}
+
+/// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
+void Lio::use_standstill(ScanStats& stats) {
+  if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return;
+  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_);
+  if (!standstill) return;
+  stats.standing = true;
+  if (learns_nothing()) return;
+  // Windows that overlap share the noise of their samples.
+  if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2) return;
+  last_standstill_ = filter_.nominal.utime;
+  FilterState cautious{filter_.nominal, cautious_};
+  correct_to_standstill(cautious, *standstill);
+  cautious_ = cautious.covariance;
+  correct_to_standstill(filter_, *standstill);
 }
 
 }  // namespace ignis

@@ -8,7 +8,6 @@
 
 #include "frontend/reacquisition.h"
 #include "frontend/scan_instant.h"
-#include "frontend/standstill.h"
 #include "frontend/voxel_downsample.h"
 
 namespace ignis {
@@ -263,6 +262,10 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation,
                   blind_shifts(match.degeneracy));
   result.covariance = published.covariance.topLeftCorner<15, 15>();
+  if (match.stats.applied() && config_.deskew) {
+    result.covariance.diagonal().segment<3>(kAttitude).array() +=
+        unseen_turn_variance(config_.imu_noise_gyro, 1e-6 * scan.duration_us);
+  }
   result.trust = trust_.trust();
   if (velocity_known_) {
     result.keyframe =
@@ -375,22 +378,6 @@ void Lio::begin_new_map() {
   keyframer_ = Keyframer(config_, session_);
   trust_.note_loss();
   opinion_.forget();
-}
-
-/// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
-void Lio::use_standstill(ScanStats& stats) {
-  if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return;
-  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_);
-  if (!standstill) return;
-  stats.standing = true;
-  if (learns_nothing()) return;
-  // Windows that overlap share the noise of their samples.
-  if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2) return;
-  last_standstill_ = filter_.nominal.utime;
-  FilterState cautious{filter_.nominal, cautious_};
-  correct_to_standstill(cautious, *standstill);
-  cautious_ = cautious.covariance;
-  correct_to_standstill(filter_, *standstill);
 }
 
 }  // namespace ignis

@@ -14,6 +14,8 @@ double mean_age(const Scan& scan) {
   return sum / static_cast<double>(scan.points.size());
 }
 
+double unseen_turn_variance(double gyro_noise, double seconds) { return gyro_noise * gyro_noise * seconds / 3.0; }
+
 double velocity_variance(const ErrorCovariance& covariance) {
   return covariance.diagonal().segment<3>(kVelocity).sum();
 }

@@ -15,6 +15,12 @@ namespace ignis {
 /// Seconds from the mean instant of a scan's points to its end; zero for a scan without points.
 [[nodiscard]] double mean_age(const Scan& scan);
 
+/// Variance [rad^2], per axis, of the turn that the gyro's noise adds between the instants of a scan's points, in their
+/// mean, and its end. The points are carried to the end by that turn, so scan matching does not see it: the attitude
+/// that it finds is that of the mean instant, as the gyro has carried it on. New in each scan, so a map, which is a
+/// mean of many, hardly has it. `gyro_noise` [rad/s/sqrt(Hz)]; points evenly spread over `seconds`.
+[[nodiscard]] double unseen_turn_variance(double gyro_noise, double seconds);
+
 /// Variance of the velocity [m^2/s^2], sum over the axes.
 [[nodiscard]] double velocity_variance(const ErrorCovariance& covariance);
 

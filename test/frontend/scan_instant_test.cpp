@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
+#include <vector>
 
 #include "frontend/deskew.h"
 
@@ -35,6 +37,36 @@ TEST(ScanInstant, CovarianceIsThatOfThePositionPlusSecondsTimesVelocity) {
   J.block<3, 3>(kPosition, kVelocity) = -0.03 * Eigen::Matrix3d::Identity();
   EXPECT_LT((with_position_at(P, -0.03) - J * P * J.transpose()).norm(), 1e-12 * P.norm());
   EXPECT_LT((with_position_at(with_position_at(P, -0.03), 0.03) - P).norm(), 1e-12 * P.norm());
+}
+
+TEST(ScanInstant, TheGyrosNoiseTurnsTheMeanOfADeskewedScanByWhatIsTold) {
+  constexpr double kNoise = 0.003;  // rad/s/sqrt(Hz)
+  constexpr Utime kPeriodUs = 1'000;
+  Scan scan;
+  scan.utime = 1'000'000;
+  scan.duration_us = 100'000;
+  for (std::int32_t dt = 0; dt <= scan.duration_us; dt += 500) {
+    scan.points.push_back({.position = {0.0F, 0.0F, -10.0F}, .dt_us = dt});
+  }
+  NavState end;
+  end.utime = scan.end_utime();
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0.0, kNoise / std::sqrt(1e-6 * kPeriodUs));
+  double variance = 0.0;
+  constexpr int kTrials = 1000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<ImuSample> imu(102);
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      imu[i].utime = scan.utime + kPeriodUs * static_cast<Utime>(i);
+      imu[i].accel = {0.0, 9.81, 0.0};
+      imu[i].gyro.y() = noise(random);
+    }
+    double turn = 0.0;
+    for (const CloudPoint& point : deskew(scan, end, imu, 9.81)) turn += point.position.x() / 10.0;
+    turn /= static_cast<double>(scan.points.size());
+    variance += turn * turn / kTrials;
+  }
+  EXPECT_NEAR(variance / unseen_turn_variance(kNoise, 0.1), 1.0, 0.15);  // three sigma of so many trials
 }
 
 TEST(ScanInstant, OnlyWhatIsNewOfTheVelocitysErrorCounts) {
