@@ -17,9 +17,9 @@ class PlaneFinder {
  public:
   explicit PlaneFinder(const FrontendConfig& config);
 
-  /// One for each query [m, odom frame], as seen from a point; valid until the next call. Where the neighbourhood within
-  /// match_radius_m holds too few points, the plane is sought within wide_match_radius_m: far surfaces are sparse, and a
-  /// small neighbourhood keeps edges sharp where the map is dense.
+  /// One for each query [m, odom frame], as seen from a point; valid until the next call. Where the neighbourhood
+  /// within match_radius_m holds too few points, the plane is sought within wide_match_radius_m: far surfaces are
+  /// sparse, and a small neighbourhood keeps edges sharp where the map is dense.
   [[nodiscard]] std::span<const PlaneFit> find(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
                                                const Eigen::Vector3d& seen_from);
 
@@ -32,11 +32,11 @@ class PlaneFinder {
   FrontendConfig config_;
   FrontendConfig wide_config_;  ///< gates of planes in the wide neighbourhood
   NeighbourSearch search_;
-  std::vector<PlaneFit> planes_;                ///< [query]
-  std::vector<std::size_t> chosen_;             ///< those of the queries that planes are sought for
+  std::vector<PlaneFit> planes_;     ///< [query]
+  std::vector<std::size_t> chosen_;  ///< those of the queries that planes are sought for
   std::vector<Eigen::Vector3d> chosen_queries_;
-  std::vector<PlaneFit*> chosen_planes_;        ///< those of planes_ that go with them
-  std::vector<Eigen::Vector3d> sides_;          ///< normals that point to the side that they are seen from
+  std::vector<PlaneFit*> chosen_planes_;  ///< those of planes_ that go with them
+  std::vector<Eigen::Vector3d> sides_;    ///< normals that point to the side that they are seen from
 };
 
 }  // namespace ignis

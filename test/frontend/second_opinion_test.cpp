@@ -83,6 +83,16 @@ TEST(SecondOpinion, LeavesADirectionThatManyPlanesFaceToTheScans) {
   EXPECT_FALSE(drive.opinion.contradiction());
 }
 
+TEST(SecondOpinion, HasToBeSurerWhereSomeOfThePlanesFaceTheDirection) {
+  Drive drive;
+  drive.facing.diagonal() << 0.45, 0.45, 0.1;
+  drive.run(3.0, 0.0);
+  drive.run(2.0, -0.3);  // 5.4 to 6.3 sigma
+  EXPECT_FALSE(drive.opinion.contradiction());
+  drive.run(2.0, -0.5);
+  EXPECT_TRUE(drive.opinion.contradiction());
+}
+
 TEST(SecondOpinion, LetsScansTellAVelocityThatWasNotKnown) {
   Drive drive;
   drive.know_velocity_to(0.5);
