@@ -48,6 +48,11 @@ def resident_mb(pid: int) -> float:
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def step_of(number: int) -> int:
+    """The scan of a keyframe."""
+    return round(number * SPACING_M / (SPEED * SCAN_PERIOD))
+
+
 class Sender(Drive):
     """A front end that keeps what it sent and sends it again when asked, and a back end that counts it."""
 
@@ -58,7 +63,9 @@ class Sender(Drive):
         self.bus.subscribe("KEYFRAME_REQUEST", self._send_again)
 
     def send(self, number: int) -> None:
-        self.step = round(number * SPACING_M / (SPEED * SCAN_PERIOD))
+        self.step = step_of(number - 1)
+        self.last_keyframe_stamp = self.stamp()  # also of one that is sent again
+        self.step = step_of(number)
         del self.keyframes[number:]  # its length is the next id
         self.publish_keyframe(self.position(), self.scan)
 
