@@ -11,9 +11,9 @@
 
 #include "frontend/deskew.h"
 #include "frontend/eskf.h"
+#include "frontend/four_planes.h"
 #include "frontend/neighbour_search.h"
 #include "frontend/plane_fit.h"
-#include "frontend/plane_fits.h"
 #include "frontend/scan_matcher.h"
 #include "frontend/scan_update.h"
 #include "frontend/voxel_downsample.h"
@@ -179,7 +179,7 @@ void fit_planes_to_each_four(benchmark::State& state, const std::string& sensor)
     for (std::size_t i = 0; i < moments.size(); ++i) {
       const auto plane = [&](std::size_t k) { return &planes[kLanes * i + k]; };
       const std::array<PlaneFit*, kLanes> four = {plane(0), plane(1), plane(2), plane(3)};
-      fit_planes(moments[i], drive.config, drive.config.match_radius_m, four);
+      fit_four_planes(moments[i], drive.config, drive.config.match_radius_m, four);
     }
     benchmark::DoNotOptimize(planes.data());
   }

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "frontend/plane_fits.h"
+#include "frontend/four_planes.h"
 
 namespace ignis {
 
@@ -54,7 +54,7 @@ void PlaneFinder::fit(const LocalMap& map, std::span<const Eigen::Vector3d> quer
   std::span<PlaneFit* const> left = chosen_planes_;
   for (const FourMoments& moments : search_.gather(map, chosen_queries_, radius, sides)) {
     const auto four = left.first(std::min<std::size_t>(kLanes, left.size()));
-    fit_planes(moments, config, radius, four);
+    fit_four_planes(moments, config, radius, four);
     left = left.subspan(four.size());
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/plane_fits.h"
+#include "frontend/four_planes.h"
 
 #include <array>
 #include <cmath>
@@ -137,8 +137,8 @@ Eigen::Vector3d lane_of(const Vector& v, int k) { return {v.x[k], v.y[k], v.z[k]
 
 }  // namespace
 
-void fit_planes(const FourMoments& moments, const FrontendConfig& config, double radius,
-                std::span<PlaneFit* const> fits) {
+void fit_four_planes(const FourMoments& moments, const FrontendConfig& config, double radius,
+                     std::span<PlaneFit* const> fits) {
   const LaneMask enough = moments.count >= all(static_cast<float>(config.min_plane_points));
   if (!any(enough)) {
     for (PlaneFit* fit : fits) *fit = {};

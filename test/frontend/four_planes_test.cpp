@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/plane_fits.h"
+#include "frontend/four_planes.h"
 
 #include <cmath>
 #include <random>
@@ -34,7 +34,7 @@ std::array<PlaneFit, kLanes> fits_of(const std::array<NeighbourMoments, kLanes>&
   std::array<PlaneFit, kLanes> fits;
   for (PlaneFit& fit : fits) fit.normal.setConstant(7.0);  // of another point, which must not be left
   const std::array<PlaneFit*, kLanes> places = {&fits[0], &fits[1], &fits[2], &fits[3]};
-  fit_planes(four_of(each), config, radius, places);
+  fit_four_planes(four_of(each), config, radius, places);
   return fits;
 }
 
@@ -87,7 +87,7 @@ bool is_clear(const NeighbourMoments& moments, PlaneVerdict verdict, double radi
   return true;
 }
 
-TEST(PlaneFits, EqualTheSingleFitOfEveryNeighbourhood) {
+TEST(FourPlanes, EqualTheSingleFitOfEveryNeighbourhood) {
   const FrontendConfig config = gates();
   constexpr double kRadius = 0.2;
   RandomNeighbourhoods neighbourhoods;
@@ -122,7 +122,7 @@ TEST(PlaneFits, EqualTheSingleFitOfEveryNeighbourhood) {
   for (const int count : seen) EXPECT_GT(count, 100);
 }
 
-TEST(PlaneFits, SurviveLinesPointsAndBalls) {
+TEST(FourPlanes, SurviveLinesPointsAndBalls) {
   FrontendConfig config = gates();
   config.min_plane_points = 3;
   NeighbourMoments line;

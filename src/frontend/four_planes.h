@@ -13,7 +13,7 @@ namespace ignis {
 /// rad where the plane stands apart from a line or a ball, and what no gate lets through only roughly.
 ///
 /// `fits`: where the planes of the first lanes go, at most four.
-void fit_planes(const FourMoments& moments, const FrontendConfig& config, double radius,
-                std::span<PlaneFit* const> fits);
+void fit_four_planes(const FourMoments& moments, const FrontendConfig& config, double radius,
+                     std::span<PlaneFit* const> fits);
 
 }  // namespace ignis
