@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Row B7 between two computers: each has a driver, both on one bus (TTL 1). All name it and go by the first."""
 
+import contextlib
 import json
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -128,25 +130,32 @@ def second_pid(drivers: list[str], alone: Heard) -> str:
     return name.split()[1]
 
 
+@contextlib.contextmanager
+def front_end_on_a_bus(folder: Path) -> Iterator[Computer]:
+    """A computer of its own on which a front end listens."""
+    computer = Computer(folder)
+    try:
+        for words in (("link", "set", "lo", "up", "multicast", "on"), ("route", "add", "224.0.0.0/4", "dev", "lo")):
+            must(computer.run("ip", *words))
+        computer.start("lio_frontend", "--config", CONFIG, "--lcm-url", URL)
+        yield computer
+    finally:
+        computer.close()
+
+
 @pytest.mark.parametrize(
     ("names", "ignored"), [(["l1_driver"], True), (["l1_driver", "map_builder", "graph_backend"], False)]
 )
 def test_fault_b7_who_plays_a_log_of_many_processes_is_named_and_still_heard(
     tmp_path: Path, names: list[str], ignored: bool
 ) -> None:
-    computer = Computer(tmp_path)
-    try:
-        for words in (("link", "set", "lo", "up", "multicast", "on"), ("route", "add", "224.0.0.0/4", "dev", "lo")):
-            must(computer.run("ip", *words))
-        computer.start("lio_frontend", "--config", CONFIG, "--lcm-url", URL)
+    with front_end_on_a_bus(tmp_path) as computer:
         start_driver(computer)
         time.sleep(2.0)
         player = subprocess.Popen(computer.line(sys.executable, "-c", PLAY, *names))
         heard = hear(computer)
         player.terminate()
         player.wait(10)
-    finally:
-        computer.close()
     print(heard)
     text = heard.of("lio_frontend")[1]
     assert "two instances of l1_driver are on the bus" in text
@@ -157,11 +166,7 @@ def test_fault_b7_who_plays_a_log_of_many_processes_is_named_and_still_heard(
 def test_fault_b7_two_that_have_the_same_process_id_are_named_and_the_later_one_not_listened_to(
     tmp_path: Path,
 ) -> None:
-    computer = Computer(tmp_path)
-    try:
-        for words in (("link", "set", "lo", "up", "multicast", "on"), ("route", "add", "224.0.0.0/4", "dev", "lo")):
-            must(computer.run("ip", *words))
-        computer.start("lio_frontend", "--config", CONFIG, "--lcm-url", URL)
+    with front_end_on_a_bus(tmp_path) as computer:
         time.sleep(2.0)
         players = []
         for _ in range(2):
@@ -171,8 +176,6 @@ def test_fault_b7_two_that_have_the_same_process_id_are_named_and_the_later_one_
         for player in players:
             player.terminate()
             player.wait(10)
-    finally:
-        computer.close()
     print(heard)
     texts = heard.told["lio_frontend"]
     assert any("two instances of l1_driver are on the bus (processes 7 at " in text for text in texts)
