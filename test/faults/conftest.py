@@ -20,5 +20,6 @@ def undisturbed(drive_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Se
     with FaultRun(tmp_path_factory.mktemp("undisturbed")) as run:
         run.play(drive_log)
         run.seen.status = run.view_status()
+        run.seen.frontend_work = run.work("lio_frontend")
     assert len(run.seen.keyframes) >= 3 and set(run.seen.poses) == set(run.seen.keyframes)
     return run.seen

@@ -14,6 +14,7 @@ from typing import Any
 
 import ignis_lcm.ignis as types
 import lcm
+from l1_endurance import cpu_seconds
 
 from ignis.pipeline import Pipeline
 
@@ -43,9 +44,11 @@ class Seen:
     keyframes: dict[int, bytes] = field(default_factory=dict)
     poses: dict[int, tuple[float, ...]] = field(default_factory=dict)
     states: list[int] = field(default_factory=list)  # stamps of LIO_STATE
+    states_sent: int = 0  # by their running number, so that it counts those too that did not arrive here
     smoothed: list[Any] = field(default_factory=list)
     health: dict[str, list[Any]] = field(default_factory=dict)
     status: dict[str, Any] = field(default_factory=dict)
+    frontend_work: float = 0.0  # [s] of a processor
 
     def rejected(self, process: str, channel: str) -> int:
         """What the process says that it refused on the channel."""
@@ -72,7 +75,7 @@ class FaultRun:
         for channel, take in {
             "LIO_KEYFRAME": self._on_keyframe,
             "SMOOTHED_KEYFRAMES": self._on_revision,
-            "LIO_STATE": lambda data: self.seen.states.append(types.state_t.decode(data).utime),
+            "LIO_STATE": self._on_state,
             "SMOOTHED_STATE": lambda data: self.seen.smoothed.append(types.state_t.decode(data)),
             "HEALTH": self._on_health,
         }.items():
@@ -129,10 +132,19 @@ class FaultRun:
         rows = zip(part.px, part.py, part.pz, part.qw, part.qx, part.qy, part.qz, strict=True)
         self.seen.poses.update(zip(part.ids, rows, strict=True))
 
+    def _on_state(self, data: bytes) -> None:
+        state = types.state_t.decode(data)
+        self.seen.states.append(state.utime)
+        self.seen.states_sent = max(self.seen.states_sent, state.sequence + 1)
+
     def _on_health(self, data: bytes) -> None:
         message = types.health_t.decode(data)
         if message.pid in {process.pid for process in self.pipeline.processes.values()}:
             self.seen.health.setdefault(message.process, []).append(message)
+
+    def work(self, name: str) -> float:
+        """Seconds of a processor that a process has taken so far."""
+        return cpu_seconds(self.pipeline.processes[name].pid)
 
     def send(self, channel: str, body: bytes) -> None:
         """Publishes what nobody should send; the listener knows it again."""
