@@ -80,6 +80,7 @@ Json processes_json(const HudData& data) {
 
 Json link_json(const HudData& data) {
   return {{"lost", data.messages_lost},
+          {"repeated", data.messages_repeated},
           {"received", data.messages_received},
           {"age_s", data.has_state ? Json(data.state_age_s) : Json()}};
 }

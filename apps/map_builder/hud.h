@@ -38,7 +38,8 @@ struct HudData {
   bool rebuilding = false;
   std::int64_t messages_received = 0;
   std::int64_t messages_lost = 0;
-  std::string health;  ///< state_text of this process
+  std::int64_t messages_repeated = 0;  ///< parts of keyframes that were whole already
+  std::string health;                  ///< state_text of this process
   std::vector<ProcessTable::Row> processes;
   std::array<double, 3> band_radii{};  ///< [m] windows of the levels
 };

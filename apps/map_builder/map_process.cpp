@@ -296,6 +296,7 @@ void MapProcess::update_status() {
   hud_.state_age_s = seconds(Clock::now() - last_state_);
   keyframe_counts_->queue_drops = keyframes_.incomplete();
   hud_.messages_lost = clouds_.incomplete() + keyframes_.incomplete() + revisions_.incomplete();
+  hud_.messages_repeated = keyframes_.repeated();
   hud_.messages_received = 0;
   for (const runtime::ReceiverCounts* receiver : receivers_) {
     hud_.messages_lost += receiver->lost;

@@ -139,6 +139,12 @@ KeyframeAssembler::Open& KeyframeAssembler::open_for(const keyframe_t& part) {
   return open_.back();
 }
 
+void KeyframeAssembler::drop_one() {
+  const auto repeat = std::ranges::find_if(open_, &Open::was_whole);
+  if (repeat == open_.end()) ++incomplete_;
+  open_.erase(repeat == open_.end() ? open_.begin() : repeat);
+}
+
 std::size_t KeyframeAssembler::parts_waiting() const {
   return std::transform_reduce(open_.begin(), open_.end(), std::size_t{0}, std::plus{},
                                [](const Open& open) { return open.parts.waiting(); });
@@ -149,11 +155,10 @@ std::optional<Keyframe> KeyframeAssembler::add(const keyframe_t& part) {
   const std::int64_t given_up = open.parts.incomplete();
   const std::optional<std::vector<keyframe_t>> parts = open.parts.add(part);
   incomplete_ += open.parts.incomplete() - given_up;
-  if (open.parts.waiting() == 0) open_.pop_back();
-  while (open_.size() > kMostOpen || parts_waiting() > kMostParts) {
-    open_.pop_front();
-    ++incomplete_;
-  }
+  if (open.was_whole) ++repeated_;
+  open.was_whole |= parts.has_value();
+  if (open.parts.waiting() == 0 && !open.was_whole) open_.pop_back();
+  while (open_.size() > kMostOpen || parts_waiting() > kMostParts) drop_one();
   if (!parts) return std::nullopt;
   const keyframe_t& first = parts->front();
   Keyframe keyframe;

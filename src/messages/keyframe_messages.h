@@ -18,14 +18,18 @@ namespace ignis::messages {
 [[nodiscard]] std::vector<keyframe_t> to_messages(const Keyframe& keyframe);
 
 /// Puts the parts of keyframes together again. A request is answered with up to 16 keyframes in one go, and where the
-/// network lets their parts overtake each other all of them are on their way at once. Bounded: of more than 32
-/// keyframes or kMostParts parts that wait, the keyframe that has waited longest for its next part is given up.
+/// network lets their parts overtake each other all of them are on their way at once. Parts that come again behind a
+/// whole keyframe are no keyframe that waits, unless all of them do: then it is handed over again, for whoever has put
+/// it aside. Bounded: of more than 32 keyframes or kMostParts parts, repeats go first, and then the keyframe that has
+/// waited longest for its next part is given up.
 class KeyframeAssembler {
  public:
   /// A complete keyframe, or nothing yet.
   [[nodiscard]] std::optional<Keyframe> add(const keyframe_t& part);
   /// Keyframes that were given up because a part never came, or not in time.
   [[nodiscard]] std::int64_t incomplete() const { return incomplete_; }
+  /// Parts that came again although their keyframe was whole already.
+  [[nodiscard]] std::int64_t repeated() const { return repeated_; }
   [[nodiscard]] std::size_t parts_waiting() const;
 
  private:
@@ -33,12 +37,15 @@ class KeyframeAssembler {
     std::int32_t session;
     std::int32_t id;
     PartAssembler<keyframe_t> parts;
+    bool was_whole = false;
   };
 
   Open& open_for(const keyframe_t& part);
+  void drop_one();
 
-  std::deque<Open> open_;  ///< the last one is that of the newest part
+  std::deque<Open> open_;  ///< and those that were whole lately; the last one is that of the newest part
   std::int64_t incomplete_ = 0;
+  std::int64_t repeated_ = 0;
 };
 
 }  // namespace ignis::messages

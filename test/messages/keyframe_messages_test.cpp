@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 #include <set>
 
@@ -113,6 +114,31 @@ TEST(KeyframeMessages, ThatStayIncompleteAreGivenUpInTheOrderOfTheirNewestPart) 
   EXPECT_FALSE(assembler.add(impossible));
   EXPECT_EQ(assembler.incomplete(), 9);
   EXPECT_TRUE(assembler.add(all[9].back()));
+}
+
+TEST(KeyframeMessages, PartsThatComeAgainBehindTheWholeAreRepeatsAndNoKeyframesThatWait) {
+  KeyframeAssembler assembler;
+  std::map<std::int32_t, std::vector<keyframe_t>> keyframes;
+  for (keyframe_t& part : mixed_parts(41)) keyframes[part.id].push_back(std::move(part));
+  const std::vector<keyframe_t> waiting = keyframes.extract(40).mapped();
+  EXPECT_FALSE(assembler.add(waiting.front()));
+  for (const auto& [id, parts] : keyframes) {
+    for (const keyframe_t& part : parts) EXPECT_EQ(assembler.add(part).has_value(), part.part == parts.back().part);
+    EXPECT_FALSE(assembler.add(parts.back())) << id;
+  }
+  EXPECT_EQ(assembler.repeated(), 40);
+  EXPECT_TRUE(assembler.add(waiting.back())) << "repeats have not taken its place";
+  EXPECT_EQ(assembler.incomplete(), 0);
+}
+
+TEST(KeyframeMessages, AreHandedOverAgainWhenAllOfTheirPartsComeAgain) {
+  KeyframeAssembler assembler;
+  const std::vector<keyframe_t> parts = to_messages(keyframe_of(10, 9000, 15.0F));
+  for (int time = 0; time < 2; ++time) {
+    EXPECT_FALSE(assembler.add(parts.front()));
+    EXPECT_TRUE(assembler.add(parts.back())) << "a receiver that had no room asks for it again";
+  }
+  EXPECT_EQ(assembler.incomplete(), 0);
 }
 
 TEST(Fault_B5, KeyframesWithoutEndAreHeldInPart) {
