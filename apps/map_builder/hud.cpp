@@ -66,6 +66,11 @@ Json map_json(const HudData& data) {
           {"frames_sent", map.frames_sent},
           {"frames_skipped", map.frames_skipped},
           {"messages_lost", data.messages_lost},
+          {"refused",
+           {{"clouds", data.refused_clouds},
+            {"poses", data.refused_poses},
+            {"of_other_sessions", data.refused_of_other_sessions}}},
+          {"keyframes_given_up", data.keyframes_given_up},
           {"health", data.health},
           {"bands_m", data.band_radii}};
 }

@@ -39,7 +39,11 @@ struct HudData {
   std::int64_t messages_received = 0;
   std::int64_t messages_lost = 0;
   std::int64_t messages_repeated = 0;  ///< parts of keyframes that were whole already
-  std::string health;                  ///< state_text of this process
+  std::int64_t refused_clouds = 0;
+  std::int64_t refused_poses = 0;
+  std::int64_t refused_of_other_sessions = 0;
+  std::int64_t keyframes_given_up = 0;  ///< their clouds never came
+  std::string health;                   ///< state_text of this process
   std::vector<ProcessTable::Row> processes;
   std::array<double, 3> band_radii{};  ///< [m] windows of the levels
 };

@@ -20,11 +20,15 @@ using std::chrono::milliseconds;
 constexpr milliseconds kHudPeriod{100};
 constexpr std::chrono::seconds kReportPeriod{1};
 constexpr std::size_t kMaxRequestedIds = 32;
-constexpr int kMaxRequests = 5;  // the front end keeps a ring: what it no longer has will never come
 constexpr int kHealthQueue = 100;
 constexpr std::chrono::seconds kRefusalTold{3};
+constexpr std::chrono::seconds kLossTold{60};
 
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+std::string given_up_text(std::int64_t keyframes) {
+  return std::format("the clouds of {} keyframes are given up: nobody sends them again", keyframes);
+}
 
 double now_s() { return seconds(std::chrono::steady_clock::now().time_since_epoch()); }
 
@@ -38,7 +42,9 @@ MapProcess::MapProcess(const runtime::Application& application, const runtime::H
       lasting_(map_config_, journal_folder),
       frame_period_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))),
-      other_sessions_(kRefusalTold) {
+      refusals_(kRefusalTold),
+      other_sessions_(kRefusalTold),
+      given_up_(kLossTold) {
   hud_.map.address = server_.address();
   hud_.band_radii = {map_config_.local_window_m, map_config_.mid_window_m, map_config_.coarse_window_m};
   subscribe(application.config.lcm);
@@ -81,7 +87,7 @@ void MapProcess::subscribe(const runtime::LcmConfig& lcm) {
 bool MapProcess::accept_session(std::int32_t session) {
   if (!session_) session_ = session;
   if (session == *session_) return true;
-  ++of_other_sessions_;
+  ++hud_.refused_of_other_sessions;
   return false;
 }
 
@@ -92,7 +98,7 @@ void MapProcess::begin_session(std::int32_t session) {
   missed_ = {};
   loops_.clear();
   graph_keyframes_ = 0;
-  request_counts_.clear();
+  keyframe_requests_.begin_session();
   hud_.loops_accepted = 0;
   hud_.loops_withdrawn = 0;
   ++resets_;
@@ -110,7 +116,7 @@ bool MapProcess::refuse_pose(const Pose& pose) {
 
 void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
   if (!usable(cloud.T_odom_body)) {
-    ++refused_clouds_;
+    ++hud_.refused_clouds;
     return;
   }
   if (lasting_.waits_for_scan()) session_ = cloud.session;
@@ -152,7 +158,7 @@ void MapProcess::catch_up() {
 void MapProcess::insert(const messages::PosedCloud& cloud) {
   const InsertCounts counts = timed(budget_.insertion, [&] { return lasting_.insert_scan(cloud); });
   if (!cloud.points.empty() && counts.rejected == cloud.points.size()) {
-    ++refused_clouds_;
+    ++hud_.refused_clouds;
     return;
   }
   hud_.map.utime = cloud.utime;
@@ -294,7 +300,9 @@ void MapProcess::update_status() {
   hud_.map.revision = map_.revision();
   hud_.rebuilding = map_.rebuilding();
   hud_.state_age_s = seconds(Clock::now() - last_state_);
-  keyframe_counts_->queue_drops = keyframes_.incomplete();
+  hud_.refused_poses = refused_messages_ + map_.refused_poses();
+  hud_.keyframes_given_up = keyframe_requests_.given_up();
+  keyframe_counts_->queue_drops = keyframes_.incomplete() + hud_.keyframes_given_up;
   hud_.messages_lost = clouds_.incomplete() + keyframes_.incomplete() + revisions_.incomplete();
   hud_.messages_repeated = keyframes_.repeated();
   hud_.messages_received = 0;
@@ -310,16 +318,20 @@ void MapProcess::update_status() {
 
 /// Why the map is not what it should be; empty while it is.
 std::string MapProcess::trouble() {
-  const bool session_trouble = other_sessions_.look(of_other_sessions_, Clock::now());
+  const auto now = Clock::now();
+  const bool session_trouble = other_sessions_.look(hud_.refused_of_other_sessions, now);
+  const bool refusal = refusals_.look(hud_.refused_clouds + hud_.refused_poses, now);
+  const bool loss = given_up_.look(hud_.keyframes_given_up, now);
   if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
   if (std::string failure = lasting_.failure(); !failure.empty()) return failure;
   if (std::string missing = missed_.trouble(now_s()); !missing.empty()) return missing;
   if (!journal_damage_.empty() && now_s() - journal_damage_s_ < MissedScans::kTold_s) return journal_damage_;
   if (session_trouble) {
-    return std::format("{} messages of another session than {} refused", of_other_sessions_, session_.value_or(0));
+    return std::format("{} messages of another session than {} refused", hud_.refused_of_other_sessions,
+                       session_.value_or(0));
   }
-  const std::int64_t poses = refused_messages_ + map_.refused_poses();
-  if (refused_clouds_ + poses > 0) return std::format("{} clouds and {} poses refused", refused_clouds_, poses);
+  if (refusal) return std::format("{} clouds and {} poses refused", hud_.refused_clouds, hud_.refused_poses);
+  if (loss) return given_up_text(hud_.keyframes_given_up);
   return {};
 }
 
@@ -339,8 +351,12 @@ void MapProcess::report() {
 void MapProcess::request_missing_keyframes() {
   // The newest ones may still be on their way. How many there are is another's word: no list that long is made.
   std::vector<std::int32_t> ids = map_.missing_keyframes(
-      graph_keyframes_ - 1, kMaxRequestedIds, [this](std::int32_t id) { return request_counts_[id]++ < kMaxRequests; });
+      graph_keyframes_ - 1, kMaxRequestedIds, [this](std::int32_t id) { return keyframe_requests_.allow(id); });
   if (!ids.empty()) request(channels::kKeyframeRequest, std::move(ids));
+  if (const std::int64_t given_up = keyframe_requests_.given_up(); given_up > 2 * given_up_told_) {
+    given_up_told_ = given_up;
+    std::cerr << std::format("map_builder: {}\n", given_up_text(given_up));
+  }
 }
 
 void MapProcess::request(const char* channel, std::vector<std::int32_t> ids) {

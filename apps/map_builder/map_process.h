@@ -11,6 +11,7 @@
 #include "map/picture_builder.h"
 #include "map_builder/event_feed.h"
 #include "map_builder/hud.h"
+#include "map_builder/keyframe_requests.h"
 #include "map_builder/lasting_map.h"
 #include "map_builder/loop_table.h"
 #include "map_builder/missed_scans.h"
@@ -104,13 +105,14 @@ class MapProcess {
   std::map<double, SharedPicture> pictures_;
   std::int64_t picture_number_ = 0;
   std::string journal_damage_;
-  double journal_damage_s_ = 0.0;  // when it was found
-  std::int64_t refused_clouds_ = 0;
-  std::int64_t refused_messages_ = 0;   // with a pose that no map can hold
-  std::int64_t of_other_sessions_ = 0;  // refused as well
+  double journal_damage_s_ = 0.0;      // when it was found
+  std::int64_t refused_messages_ = 0;  // with a pose that no map can hold
+  runtime::RecentRise refusals_;
   runtime::RecentRise other_sessions_;
+  runtime::RecentRise given_up_;
+  std::int64_t given_up_told_ = 0;  // in the log, whenever it has doubled
   std::int32_t graph_keyframes_ = 0;
-  std::map<std::int32_t, int> request_counts_;
+  KeyframeRequests keyframe_requests_;
   std::int32_t request_sequence_ = 0;
   std::int32_t command_sequence_ = 0;
   struct Rebuilt {

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from map_drive import LARGEST, URL, Drive, forged_message
+from map_drive import LARGEST, URL, Drive, forged_message, hall_scan
 from stream_server import Server
 
 PAUSE_S = 0.002  # between two scans
@@ -26,8 +26,8 @@ class FollowedDrive(Drive):
             self.advance()
             time.sleep(PAUSE_S)
 
-    def wait_for(self, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        deadline = time.monotonic() + 10.0
+    def wait_for(self, condition: Callable[[dict[str, Any]], bool], seconds: float = 10.0) -> dict[str, Any]:
+        deadline = time.monotonic() + seconds
         while not condition(status := json.loads(self.server.request("/api/status")[2])):
             assert time.monotonic() < deadline, status
             time.sleep(0.05)
@@ -83,3 +83,32 @@ def test_after_a_forged_keyframe_of_another_session_the_drive_comes_back(server:
     drive.advance_by(60)
     assert len(drive.keyframes) == 6
     drive.wait_for(lambda status: status["keyframes"] >= 3)
+
+
+@pytest.mark.parametrize(("kind", "refused"), [("clouds", (1, 0)), ("poses", (0, 1))])
+def test_a_refused_message_is_told_while_it_is_new_and_stays_counted(
+    server: Server, kind: str, refused: tuple[int, int]
+) -> None:
+    drive = FollowedDrive(server)
+    drive.advance_by(20)
+    drive.wait_for(lambda status: status["health"] == "OK")
+    far_away = [1e7, 0.0, 0.0]
+    if kind == "clouds":
+        drive.publish_cloud(far_away, hall_scan([0.0, 0.0, 0.0], drive.generator))
+    else:
+        drive.publish_state(far_away)
+    drive.wait_for(lambda status: "{} clouds and {} poses refused".format(*refused) in status["health"])
+    status = drive.wait_for(lambda status: status["health"] == "OK")
+    assert (status["refused"]["clouds"], status["refused"]["poses"]) == refused
+
+
+def test_keyframes_that_nobody_sends_are_given_up_by_name(server: Server) -> None:
+    drive = FollowedDrive(server)
+    drive.advance_by(60)
+    drive.wait_until_shown()
+    # The graph has two keyframes more, of which the newest may still be on its way.
+    drive.keyframes += [drive.keyframes[-1]] * 2
+    drive.publish_correction(1)
+    status = drive.wait_for(lambda status: "given up" in status["health"], seconds=30.0)
+    assert "the clouds of 1 keyframes are given up: nobody sends them again" in status["health"]
+    assert status["keyframes_given_up"] == 1
