@@ -88,7 +88,7 @@ InsertCounts LastingMap::insert_scan(const messages::PosedCloud& cloud) {
 }
 
 bool LastingMap::add_keyframe(const Keyframe& keyframe) {
-  if (!map_.add_keyframe(keyframe)) return false;
+  if (map_.has_come(keyframe.id) || !map_.add_keyframe(keyframe)) return false;
   if (!journal_) return true;
   begin_journal(keyframe.session);
   write(record_of_keyframe(map_, keyframe));

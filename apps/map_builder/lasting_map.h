@@ -40,6 +40,7 @@ class LastingMap {
   void begin_session(std::int32_t session);
 
   InsertCounts insert_scan(const messages::PosedCloud& cloud);
+  /// False when it is refused, or is no news: whoever comes again brings nothing, also when its cloud was dropped.
   bool add_keyframe(const Keyframe& keyframe);
 
   /// Why the map is not in the journal; empty while all is well, and without a journal.

@@ -181,7 +181,7 @@ void MapProcess::on_keyframe(const Keyframe& keyframe) {
 
 void MapProcess::insert(const Keyframe& keyframe) {
   if (map_.is_of_another_drive(keyframe)) begin_session(keyframe.session);
-  if (map_.clouds().contains(keyframe.id) || !lasting_.add_keyframe(keyframe)) return;
+  if (!lasting_.add_keyframe(keyframe)) return;
   events_.keyframe(keyframe.state.utime, keyframe.id);
   map_changed_ = keyframes_changed_ = true;
 }

@@ -75,6 +75,11 @@ bool LiveMap::add_keyframe(const Keyframe& keyframe) {
   return true;
 }
 
+bool LiveMap::has_come(std::int32_t id) const {
+  const auto found = nodes_.find(id);
+  return found != nodes_.end() && found->second.has_cloud;
+}
+
 bool LiveMap::is_of_another_drive(const Keyframe& keyframe) const {
   if (const auto same = nodes_.find(keyframe.id); same != nodes_.end() && same->second.has_cloud) {
     return same->second.utime != keyframe.state.utime ||
@@ -270,8 +275,7 @@ std::vector<std::int32_t> LiveMap::missing_keyframes(std::int32_t count, std::si
                                                      const std::function<bool(std::int32_t)>& wanted) const {
   std::vector<std::int32_t> missing;
   for (std::int32_t id = 0; id < count && missing.size() < limit; ++id) {
-    const auto found = nodes_.find(id);
-    if ((found == nodes_.end() || !found->second.has_cloud) && wanted(id)) missing.push_back(id);
+    if (!has_come(id) && wanted(id)) missing.push_back(id);
   }
   return missing;
 }

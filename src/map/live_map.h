@@ -111,6 +111,9 @@ class LiveMap {
   /// The cloud of a keyframe at its corrected pose [m, map]; empty when it is not in store.
   [[nodiscard]] std::vector<Eigen::Vector3f> placed_cloud(std::int32_t id) const;
 
+  /// Whether a keyframe has been added; its cloud may have been dropped since.
+  [[nodiscard]] bool has_come(std::int32_t id) const;
+
   /// Keyframe ids below `count` whose cloud never arrived and which `wanted` agrees to; the first `limit` of them.
   [[nodiscard]] std::vector<std::int32_t> missing_keyframes(std::int32_t count, std::size_t limit,
                                                             const std::function<bool(std::int32_t)>& wanted) const;

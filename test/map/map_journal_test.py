@@ -23,14 +23,15 @@ PAUSE_S = 0.002  # between two scans
 class JournalledMap:
     """A map_builder with a journal, and the drive that it is sent."""
 
-    def __init__(self, folder: Path, start: Callable[..., Server]) -> None:
+    def __init__(self, folder: Path, start: Callable[..., Server], *settings: str) -> None:
         self.folder, self.drive = folder, Drive()
+        self._settings = settings
         self._start_server = start
         self._started_at = self._missed = 0
         self.start()
 
     def start(self) -> None:
-        options = ("--port", "0", "--journal", self.folder / "journal", "--out", self.folder / "out")
+        options = ("--port", "0", "--journal", self.folder / "journal", "--out", self.folder / "out", *self._settings)
         self.server = self._start_server(*map(str, options), url=URL)
         self._started_at = self.drive.step - self._missed
 
@@ -81,11 +82,11 @@ def length_of_head(file: bytes) -> int:
 
 
 @pytest.fixture
-def make_map(private_network, start_server, tmp_path: Path) -> Iterator[Callable[[str], JournalledMap]]:
+def make_map(private_network, start_server, tmp_path: Path) -> Iterator[Callable[..., JournalledMap]]:
     made = []
 
-    def make(name: str = "map") -> JournalledMap:
-        made.append(JournalledMap(tmp_path / name, start_server))
+    def make(name: str = "map", *settings: str) -> JournalledMap:
+        made.append(JournalledMap(tmp_path / name, start_server, *settings))
         return made[-1]
 
     yield make
@@ -236,3 +237,13 @@ def test_a_second_map_refuses_the_same_journal(make_map) -> None:
     command = [binary("map_builder"), "--lcm-url", "memq://", "--port", "0", "--journal", run.folder / "journal"]
     second = subprocess.run(command, capture_output=True, text=True, timeout=10)
     assert second.returncode == 1 and "another map_builder uses the journal" in second.stderr
+
+
+def test_a_keyframe_that_comes_again_after_its_cloud_was_dropped_is_not_written_empty(make_map) -> None:
+    run = make_map("map", "--set", "map.max_keyframe_points=10000")
+    run.drive_to(STEPS)
+    names = {path.name for path in run.files()}
+    assert "map_keyframe_0" not in names, "the farthest cloud has been dropped"
+    run.drive.bus.publish(*run.drive.sent[0][0])
+    run.drive_to(STEPS + 5)
+    assert names == {path.name for path in run.files()}
