@@ -1,37 +1,48 @@
 # SPDX-License-Identifier: Apache-2.0
 """Servers for the tests of this folder."""
 
+from collections.abc import Callable, Iterator
+
 import pytest
 
-from stream_server import Server
+from stream_server import Server, WebSocket
 
 
-@pytest.fixture(scope="session")
-def start_server():
-    """Starts servers; those that a test leaves running are ended with the session."""
-    started = []
+def servers() -> Iterator[Callable[..., Server]]:
+    """Starts servers, and ends those that are left running: nobody else can start one on the same bus."""
+    started: list[Server] = []
 
-    def start(*arguments, **options):
+    def start(*arguments, **options) -> Server:
         started.append(Server(*arguments, **options))
         return started[-1]
 
     yield start
     for each in started:
-        if each.process.poll() is None:
-            each.process.kill()
-            each.process.wait()
+        each.kill()
+
+
+@pytest.fixture
+def start_server() -> Iterator[Callable[..., Server]]:
+    """Starts servers that end with the test, however it ends."""
+    yield from servers()
 
 
 @pytest.fixture(scope="module")
-def stream_server(start_server):
-    """A server without a bus, for those that look at the stream's protocol."""
-    running = start_server("--port", "0")
+def start_shared_server() -> Iterator[Callable[..., Server]]:
+    """Starts servers without a bus, that a whole file shares."""
+    yield from servers()
+
+
+@pytest.fixture(scope="module")
+def stream_server(start_shared_server: Callable[..., Server]) -> Iterator[Server]:
+    """A server for those that look at the stream's protocol."""
+    running = start_shared_server("--port", "0")
     yield running
     assert running.stop() == 0
 
 
 @pytest.fixture
-def peer(stream_server):
+def peer(stream_server: Server) -> Iterator[WebSocket]:
     """A WebSocket just opened."""
     status, web_socket = stream_server.upgrade()
     assert status == 101

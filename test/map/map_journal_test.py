@@ -5,7 +5,7 @@ import json
 import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -82,17 +82,11 @@ def length_of_head(file: bytes) -> int:
 
 
 @pytest.fixture
-def make_map(private_network, start_server, tmp_path: Path) -> Iterator[Callable[..., JournalledMap]]:
-    made = []
-
+def make_map(private_network, start_server, tmp_path: Path) -> Callable[..., JournalledMap]:
     def make(name: str = "map", *settings: str) -> JournalledMap:
-        made.append(JournalledMap(tmp_path / name, start_server, *settings))
-        return made[-1]
+        return JournalledMap(tmp_path / name, start_server, *settings)
 
-    yield make
-    for each in made:
-        if each.server.process.poll() is None:
-            each.kill()
+    return make
 
 
 def test_fault_p4_a_map_killed_between_scans_ends_equal_to_the_undisturbed_one_voxel_for_voxel(make_map) -> None:

@@ -20,8 +20,8 @@ EMPTY_FRAME_BYTES = 124
 
 
 @pytest.fixture(scope="module")
-def server(start_server):
-    running = start_server("--port", "0")
+def server(start_shared_server):
+    running = start_shared_server("--port", "0")
     yield running
     assert running.stop() == 0
 

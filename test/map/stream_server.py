@@ -29,7 +29,9 @@ class Server:
         )
         line = self.process.stdout.readline()
         found = re.search(r"http://([\d.]+):(\d+)/", line)
-        assert found, f"no address in {line!r}: {self.process.stderr.read() if not line else ''}"
+        if not found:
+            self.process.kill()
+            raise AssertionError(f"no address in {line!r}: {self.process.communicate()[1]}")
         self.port = int(found[2])
 
     def stop(self):
@@ -38,6 +40,12 @@ class Server:
         self.process.stdout.close()
         self.process.stderr.close()
         return code
+
+    def kill(self):
+        """Unless it has ended."""
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
 
     def connect(self):
         return socket.create_connection(("127.0.0.1", self.port), timeout=10)
