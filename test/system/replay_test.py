@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import ignis_lcm.ignis as types
 import nbformat
 import numpy as np
 import pyarrow.parquet
@@ -135,6 +136,27 @@ def test_a_truncated_tail_and_a_gap_are_named_and_survived(logs: list[Path], tmp
     assert said["first_drop"]["what"] == "5 of L1_IMU missing in the log"
     assert said["first_drop"]["s"] == pytest.approx(1498 / 250, abs=0.003)
     assert "first drop: at 5.99" in done.stdout
+
+
+def test_the_page_says_in_words_what_was_refused(logs: list[Path], tmp_path: Path) -> None:
+    bad = tmp_path / "bad.lcmlog"
+    with LogWriter(bad) as writer:
+        for number, event in enumerate(read_events(logs[0])):
+            data = event.data
+            if event.channel == "L1_IMU" and number in range(2000, 2010):
+                sample = types.imu_t.decode(data)
+                sample.gyro = [float("nan"), 0.0, 0.0]
+                data = sample.encode()
+            writer.write(event.utime, event.channel, data)
+    for name, log in (("bad", bad), ("sound", logs[0])):
+        done = ignis("replay", log, "--config", CONFIG, "--out", tmp_path / name / "run", "--until", SECONDS)
+        assert done.returncode == 0, done.stderr
+    count = report(tmp_path / "bad" / "run")["imu_rejected"]["not finite"]
+    assert 0 < count <= 10
+    words = (tmp_path / "bad" / "run" / "summary.html").read_text()
+    assert f"IMU samples that the front end refused: {count} not finite." in words
+    assert "Graph and map refused nothing." in words
+    assert "that the front end refused" not in (tmp_path / "sound" / "run" / "summary.html").read_text()
 
 
 def test_a_foreign_log_is_listed_and_refused(tmp_path: Path) -> None:

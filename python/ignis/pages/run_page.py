@@ -92,6 +92,7 @@ def _remarks(run: Run) -> str:
             f"Fingerprint of both trajectories {run.report['trajectory_hash']}, of the map {run.report['map_hash']}."
         ),
     ]
+    notes += _refusal_remarks(run.report)
     live, drop = run.report["live"], run.report["input"]["first_drop"]
     if drop:
         notes.append(html.note(f"First recorded drop at {drop['s']:.3f} s: {drop['what']}.", "warn"))
@@ -111,6 +112,26 @@ def _remarks(run: Run) -> str:
     if run.report["loops_kept"] == 0:
         notes.append(html.note("No loop was kept: without one, smoothing changes positions but little."))
     return html.section("In words", *notes)
+
+
+def _refusal_remarks(report: dict[str, Any]) -> list[str]:
+    """What front end, graph and map did not take, and why."""
+
+    def listed(counts: dict[str, int]) -> str:
+        return ", ".join(f"{count} {reason}" for reason, count in counts.items())
+
+    notes = []
+    if report["imu_rejected"]:
+        notes.append(html.note(f"IMU samples that the front end refused: {listed(report['imu_rejected'])}.", "warn"))
+    if left_out := {reason: count for reason, count in report["scans_by_reason"].items() if reason != _APPLIED}:
+        notes.append(html.note(f"Scans that the front end did not apply: {listed(left_out)}."))
+    if report["refusals"]:
+        notes.append(html.note(f"Refused: {report['refusals']}.", "warn"))
+    else:
+        notes.append(html.note("Graph and map refused nothing.", "good"))
+    if report["solver_failure"]:
+        notes.append(html.note(f"The graph ends before the drive does: {report['solver_failure']}.", "warn"))
+    return notes
 
 
 def _graph_remarks(graph: dict[str, Any]) -> list[str]:
