@@ -23,8 +23,8 @@ _LOG_BYTES = 1_000_000
 _LOG_FILES = 5
 # A process that ends again and again is started later and later. The first three times cost a drive nothing; s6 itself
 # waits a second when a process has lived for less. A stop ends the pause too: a sleep that lived on would hold the
-# logger's pipe open, and s6 waits for its loggers.
-_PAUSE = r"""deaths=0
+# logger's pipe open, and s6 waits for its loggers. A shell that has not become the sleep yet would lose SIGTERM.
+PAUSE = r"""deaths=0
 now=$(date +%s)
 for stamp in $(s6-svdt . | cut -c2-17); do
   # TAI64: seconds since 1970 plus 2^62 plus 10.
@@ -35,7 +35,7 @@ done
 case $deaths in 0 | 1 | 2 | 3) pause=0 ;; 4) pause=2 ;; 5) pause=5 ;; *) pause=10 ;; esac
 if [ $pause -gt 0 ]; then
   echo "ended $deaths times within a minute, at last with $(s6-svdt . | tail -n 1 | cut -c27-); next start in $pause s"
-  trap 'kill $!; exit' TERM
+  trap 'kill -KILL $!; exit' TERM
   sleep $pause &
   wait $!
   trap - TERM
@@ -204,7 +204,7 @@ class S6Supervisor:
         (self.state / "journal").mkdir(exist_ok=True)
         words = shlex.join(command)
         (folder / "notification-fd").write_text(f"{_READY_FD}\n")
-        _write_script(folder / "run", f"exec 2>&1\n{_PAUSE}\nIGNIS_READY_FD={_READY_FD} exec {words}")
+        _write_script(folder / "run", f"exec 2>&1\n{PAUSE}\nIGNIS_READY_FD={_READY_FD} exec {words}")
         log = shlex.quote(str(self.state / "log" / name))
         _write_script(folder / "log" / "run", f"exec s6-log -b T n{_LOG_FILES} s{_LOG_BYTES} {log}")
 

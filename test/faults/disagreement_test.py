@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows C4, B7 and P7: processes that do not belong together, a second instance, and one that ends again and again."""
 
+import os
+import random
+import select
 import shutil
+import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +14,7 @@ from typing import Any
 from fault_drive import BUS, CONFIG
 from ignis.bus import Listener
 from ignis.pipeline import Pipeline, binary
-from ignis.supervision import S6Supervisor
+from ignis.supervision import PAUSE, S6Supervisor
 
 # Neither reads from a sensor nor opens a port.
 PAIR = ("lio_frontend", "graph_backend")
@@ -18,6 +22,10 @@ FAULT_WITHIN_S = 2.0
 BUSY_S = 1.5  # that a busy machine may add
 STARTS = 5
 LOOP_S = 10.0
+STOPS = 400
+PAUSE_S = 1.5  # less than the pause takes
+TAI_AHEAD = 2**62 + 10  # [s] of TAI64, before 1970
+SEED = 20261125
 END_AT_ONCE = "echo no sensor today; exit 3"
 
 
@@ -117,8 +125,10 @@ def test_fault_p7_a_process_that_ends_at_once_is_started_ever_later_and_the_othe
         assert len(late) == 1 and late[0].startswith("l1_driver (ended "), late
         assert "exitcode 3: no sensor today" in late[0]
         listener = Listener(BUS, "HEALTH")
-        listener.listen(1.5)
-        assert any(name == "lio_frontend" for name, _ in listener.health), "the others go on"
+        heard_by = time.monotonic() + 1.5 + BUSY_S
+        while not any(name == "lio_frontend" for name, _ in listener.health):
+            assert time.monotonic() < heard_by, "the others go on"
+            listener.listen(0.1)
         while "next start in 10 s" not in log.read_text():
             assert time.monotonic() - began < 3 * LOOP_S, log.read_text()
             time.sleep(0.05)
@@ -131,3 +141,25 @@ def test_fault_p7_a_process_that_ends_at_once_is_started_ever_later_and_the_othe
     assert said.count("no sensor today") == STARTS + 1, "without growing waits there would be one a second"
     assert "ended 4 times within a minute, at last with exitcode 3; next start in 2 s" in said
     assert "next start in 5 s" in said
+
+
+def test_fault_p7_a_stop_ends_the_pause_before_a_start_whenever_it_comes(tmp_path: Path) -> None:
+    deaths = f"@{int(time.time()) + TAI_AHEAD:016x}00000000 exitcode 3\n" * 4
+    (tmp_path / "deaths").write_text(deaths)
+    svdt = tmp_path / "s6-svdt"
+    svdt.write_text(f"#!/bin/sh\ncat {tmp_path}/deaths\n")
+    svdt.chmod(0o755)
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    print("seed", SEED)
+    generator = random.Random(SEED)
+    for _ in range(STOPS):
+        with subprocess.Popen(
+            ["/bin/sh", "-c", PAUSE], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment
+        ) as waiting:
+            assert waiting.stdout is not None
+            assert b"next start in 2 s" in waiting.stdout.readline()
+            time.sleep(generator.uniform(0.0, 0.002))
+            waiting.terminate()
+            waiting.wait()
+            # Its logger waits for the end of the pipe, and s6 waits for the logger.
+            assert select.select([waiting.stdout], [], [], PAUSE_S)[0], "a sleep lives on"
