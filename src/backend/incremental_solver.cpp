@@ -139,6 +139,16 @@ struct IncrementalSolver::Impl {
     for (const std::size_t index : isam.factors_of(key)) errors[id_of[index]] = kUnknown;
   }
 
+  /// What the offsets of two poses make of the offset of the second against the first, in body axes of the second.
+  [[nodiscard]] std::array<Isam2::Term, 2> relative_terms(const KeyPair& pair) const {
+    const gtsam::Values& points = isam.linearisation_points();
+    const auto& [from, to] = pair;
+    const gtsam::Matrix6 A = -points.at<gtsam::Pose3>(to).between(points.at<gtsam::Pose3>(from)).AdjointMap();
+    return {Isam2::Term{from, A}, Isam2::Term{to, gtsam::I_6x6}};
+  }
+
+  [[nodiscard]] Isam2::Root relative_root(const KeyPair& pair) const { return isam.root(relative_terms(pair)); }
+
   double error_of(FactorId id) {
     const gtsam::Values& around = estimate_of(factors.at(id)->keys());
     if (std::isnan(errors[id])) errors[id] = factors[id]->error(around);
@@ -271,18 +281,38 @@ std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint6
   }
 }
 
-std::vector<Matrix6d> IncrementalSolver::relative_covariances(
-    std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs) const {
+std::vector<Matrix6d> IncrementalSolver::relative_covariances(std::span<const KeyPair> pairs) const {
   if (!impl_->broken.empty()) return {};
-  const gtsam::Values& values = impl_->isam.linearisation_points();
   std::vector<Matrix6d> covariances;
-  for (const auto& [from, to] : pairs) {
-    const gtsam::Matrix6 A = -values.at<gtsam::Pose3>(to).between(values.at<gtsam::Pose3>(from)).AdjointMap();
-    const std::array<Isam2::Term, 2> terms{Isam2::Term{from, A}, Isam2::Term{to, gtsam::I_6x6}};
-    covariances.emplace_back(impl_->isam.covariance(terms));
+  for (const KeyPair& pair : pairs) {
+    const Isam2::Root root = impl_->relative_root(pair);
+    covariances.emplace_back(Isam2::covariance(root, root));
     if (!covariances.back().allFinite()) return {};
   }
   return covariances;
+}
+
+Eigen::MatrixXd IncrementalSolver::relative_covariances(std::span<const KeyPair> rows,
+                                                        std::span<const KeyPair> columns) const {
+  if (!impl_->broken.empty()) return {};
+  std::vector<Isam2::Root> roots;
+  for (const KeyPair& pair : columns) roots.push_back(impl_->relative_root(pair));
+  Eigen::MatrixXd covariances(6 * std::ssize(rows), 6 * std::ssize(columns));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Isam2::Root root = impl_->relative_root(rows[i]);
+    for (std::size_t k = 0; k < roots.size(); ++k) {
+      covariances.block<6, 6>(6 * static_cast<Eigen::Index>(i), 6 * static_cast<Eigen::Index>(k)) =
+          Isam2::covariance(root, roots[k]);
+    }
+  }
+  if (!covariances.allFinite()) return {};
+  return covariances;
+}
+
+Vector6d IncrementalSolver::relative_offset(const KeyPair& pair) const {
+  Vector6d offset = Vector6d::Zero();
+  for (const Isam2::Term& term : impl_->relative_terms(pair)) offset += term.factor * impl_->isam.offset(term.key);
+  return offset;
 }
 
 gtsam::NonlinearFactorGraph IncrementalSolver::living_factors() const {

@@ -100,10 +100,20 @@ class IncrementalSolver {
   /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
   [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
 
+  /// Two pose variables.
+  using KeyPair = std::pair<std::uint64_t, std::uint64_t>;
+
   /// Covariances of the relative poses of pairs of pose variables, in body axes of the second of each, where the
   /// factors are linearised. Empty when they cannot be computed.
-  [[nodiscard]] std::vector<Matrix6d> relative_covariances(
-      std::span<const std::pair<std::uint64_t, std::uint64_t>> pairs) const;
+  [[nodiscard]] std::vector<Matrix6d> relative_covariances(std::span<const KeyPair> pairs) const;
+
+  /// The same between the relative poses of `rows` and those of `columns`: six rows or columns for each.
+  [[nodiscard]] Eigen::MatrixXd relative_covariances(std::span<const KeyPair> rows,
+                                                     std::span<const KeyPair> columns) const;
+
+  /// How far the solution has moved the second pose of a pair against the first from where the factors are linearised,
+  /// to first order: attitude then position, in body axes of the second. Both must exist.
+  [[nodiscard]] Vector6d relative_offset(const KeyPair& pair) const;
 
   /// The factors in the graph. They are immutable, so copies of the list share them.
   [[nodiscard]] gtsam::NonlinearFactorGraph living_factors() const;

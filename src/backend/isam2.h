@@ -70,6 +70,19 @@ class Isam2 {
   /// way from these variables to the roots.
   [[nodiscard]] Eigen::MatrixXd covariance(std::span<const Term> terms) const;
 
+  /// A sum of terms as what its covariances are products of: of two sums it is A'B, where A and B are their roots. A
+  /// root's rows belong to cliques, most of which it leaves out for zero. Good until the next update.
+  struct Root {
+    struct Part {
+      int clique = 0;
+      Eigen::MatrixXd rows;
+    };
+    Eigen::Index size = 0;
+    std::vector<Part> parts;  ///< ascending
+  };
+  [[nodiscard]] Root root(std::span<const Term> terms) const;
+  [[nodiscard]] static Eigen::MatrixXd covariance(const Root& a, const Root& b);
+
   /// Scalars of quadratic forms that wait for the next elimination, and of conditionals.
   struct Size {
     std::size_t cliques = 0;

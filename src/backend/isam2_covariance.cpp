@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What Isam2 knows of its variables: covariances from the cliques between them and the roots.
+#include <algorithm>
 #include <ranges>
 
 #include "backend/isam2.h"
@@ -31,6 +32,11 @@ std::vector<int> Isam2::way_to_roots(std::span<const Term> terms) const {
 }
 
 Eigen::MatrixXd Isam2::covariance(std::span<const Term> terms) const {
+  const Root all = root(terms);
+  return covariance(all, all);
+}
+
+Isam2::Root Isam2::root(std::span<const Term> terms) const {
   // With the information L L', the covariance of F' x is Y'Y, where L Y = F. Y is zero but for the variables on the way
   // from those of F to the roots.
   const Eigen::Index size = terms.front().factor.rows();
@@ -40,7 +46,7 @@ Eigen::MatrixXd Isam2::covariance(std::span<const Term> terms) const {
                                        dimension(number), size);
   };
   for (const Term& term : terms) open(number_of_.at(term.key)) = term.factor.transpose();
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
+  Root root{size, {}};
   for (const int number : way_to_roots(terms)) {
     const Clique& at = clique(number);
     const std::span<const int> variables = at.variables;
@@ -52,11 +58,23 @@ Eigen::MatrixXd Isam2::covariance(std::span<const Term> terms) const {
       row += dimension(frontal);
     }
     at.conditional.topRows(frontal_rows).triangularView<Eigen::Lower>().solveInPlace(y);
-    covariance.noalias() += y.transpose() * y;
     for (const int other : variables.subspan(at.frontals)) {
       open(other).noalias() -= at.conditional.middleRows(row, dimension(other)) * y;
       row += dimension(other);
     }
+    root.parts.push_back({number, std::move(y)});
+  }
+  std::ranges::sort(root.parts, {}, &Root::Part::clique);
+  return root;
+}
+
+Eigen::MatrixXd Isam2::covariance(const Root& a, const Root& b) {
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(a.size, b.size);
+  auto other = b.parts.begin();
+  for (const Root::Part& part : a.parts) {
+    other = std::ranges::lower_bound(other, b.parts.end(), part.clique, {}, &Root::Part::clique);
+    if (other == b.parts.end()) break;
+    if (other->clique == part.clique) covariance.noalias() += part.rows.transpose() * other->rows;
   }
   return covariance;
 }

@@ -2,133 +2,51 @@
 #include "backend/loop_admission.h"
 
 #include <algorithm>
+#include <cmath>
 #include <format>
 #include <optional>
 #include <utility>
 
+#include "backend/graph_evidence.h"
 #include "backend/loop_consistency.h"
+#include "backend/loop_exchange.h"
+#include "backend/loop_group.h"
+#include "backend/loop_hearing.h"
 #include "backend/loop_trial.h"
 
 namespace ignis {
 namespace {
 
-// Loops that are compared with each other: the newest ones. Older ones have proved themselves or are gone.
-constexpr std::size_t kMostWitnesses = 300;
 constexpr std::size_t kMostWaiting = 100;  // the oldest is forgotten
-// [1/rad^2, 1/m^2] Information that stands for none in the directions that a loop leaves free.
-const Matrix6d kNothingKnown = 1e-6 * Matrix6d::Identity();
-
-ConsistencyRule rule_of(const BackendConfig& config) {
-  return {config.loop_drift_scale, ChiSquareBounds(config.loop_consistency_probability)};
-}
-
-LoopClaim claim_of(const GraphLoop& loop, const SmootherState& state) {
-  return {state.place_of(loop.result.from_id), state.place_of(loop.result.to_id), loop.result.T_to_from,
-          covariance_of(loop.rows, kNothingKnown), static_cast<int>(loop.rows.rows())};
-}
 
 void note(GraphLoop& loop, const ChiSquareTest& test) {
   loop.result.chi_square = test.value;
   loop.result.chi_square_bound = test.bound;
 }
 
-/// The court in session: one claim per loop that may testify, those in the graph first.
-class Hearing {
- public:
-  Hearing(const BackendConfig& config, SmootherState& state) : rule_(rule_of(config)), config_(config), state_(state) {
-    std::vector<const GraphLoop*> witnesses;
-    for (const GraphLoop& loop : state.loops) witnesses.push_back(&loop);
-    for (const GraphLoop& loop : state.waiting) witnesses.push_back(&loop);
-    if (witnesses.size() > kMostWitnesses) {
-      std::ranges::sort(witnesses, {}, &GraphLoop::number);
-      witnesses.erase(witnesses.begin(), witnesses.end() - kMostWitnesses);
-    }
-    forget_old_pairs(witnesses);
-    for (const GraphLoop* loop : witnesses) {
-      numbers_.push_back(loop->number);
-      claims_.push_back(claim_of(*loop, state_));
-    }
-    believe_largest_set();
-  }
+/// What has left the graph waits: where it was contradicted, for others to stand with.
+void wait_outside(GraphLoop loop, bool is_contradicted, SmootherState& state, LoopEvents& events) {
+  events.push_back(loop);
+  loop.result.stage = LoopStage::kVerified;
+  loop.is_contradicted = is_contradicted;
+  state.waiting.push_back(std::move(loop));
+}
 
-  [[nodiscard]] bool heard(std::int32_t number) const { return place(number).has_value(); }
-  [[nodiscard]] bool believed(std::int32_t number) const {
-    const auto at = place(number);
-    return at && std::ranges::binary_search(believed_, *at);
+/// Where loops have left the graph, those that it had contradicted before may fit now.
+void try_again_those_before(const LoopEvents& events, SmootherState& state) {
+  if (!std::ranges::contains(events, LoopReason::kWithdrawn, [](const GraphLoop& loop) { return loop.result.reason; }))
+    return;
+  for (GraphLoop& waiting : state.waiting) {
+    if (!std::ranges::contains(events, waiting.number, &GraphLoop::number)) waiting.is_contradicted = false;
   }
-  [[nodiscard]] std::size_t believed_count() const { return believed_.size(); }
+}
 
-  /// Odometry pins the loop down by itself, or another believed loop does: one that is in the graph, or one from so far
-  /// away that a place that merely looks alike would not explain both.
-  [[nodiscard]] bool supported(std::int32_t number) const {
-    const LoopClaim& claim = claims_[place(number).value()];
-    if (open_distance(claim.from, claim.to, state_.odometry, rule_) <= config_.loop_support_beyond_m) return true;
-    return std::ranges::any_of(believed_, [&](std::size_t i) {
-      const std::int32_t other = numbers_[i];
-      const bool testifies =
-          is_in(state_.loops, other) || (is_in(state_.waiting, other) && are_apart(claim, claims_[i]));
-      return other != number && testifies &&
-             open_distance(claim, claims_[i], state_.odometry, rule_) <= config_.loop_support_beyond_m;
-    });
-  }
-
- private:
-  [[nodiscard]] std::optional<std::size_t> place(std::int32_t number) const {
-    const auto found = std::ranges::find(numbers_, number);
-    if (found == numbers_.end()) return std::nullopt;
-    return static_cast<std::size_t>(found - numbers_.begin());
-  }
-
-  [[nodiscard]] static bool is_in(const auto& loops, std::int32_t number) {
-    return std::ranges::find(loops, number, &GraphLoop::number) != loops.end();
-  }
-
-  [[nodiscard]] bool are_apart(const LoopClaim& a, const LoopClaim& b) const {
-    const auto distance = [&](std::size_t i, std::size_t k) {
-      return state_.odometry.T_from_to(i, k).translation.norm();
-    };
-    return std::min(distance(a.from, b.from), distance(a.to, b.to)) >= config_.loop_support_apart_m;
-  }
-
-  /// Pairs with a loop that testifies no more are hardly ever asked for again.
-  void forget_old_pairs(const std::vector<const GraphLoop*>& witnesses) {
-    if (state_.agreement.size() <= kMostWitnesses * kMostWitnesses) return;
-    std::vector<std::uint64_t> numbers;
-    for (const GraphLoop* loop : witnesses) numbers.push_back(static_cast<std::uint64_t>(loop->number));
-    std::ranges::sort(numbers);
-    const auto testifies = [&](std::uint64_t number) { return std::ranges::binary_search(numbers, number); };
-    boost::unordered::erase_if(state_.agreement, [&](const auto& pair) {
-      return !testifies(pair.first >> 32U) || !testifies(pair.first & 0xFFFFFFFFU);
-    });
-  }
-
-  bool agree(std::size_t i, std::size_t k) {
-    const auto [first, second] = std::minmax(numbers_[i], numbers_[k]);
-    const std::uint64_t pair = (static_cast<std::uint64_t>(first) << 32U) | static_cast<std::uint32_t>(second);
-    const auto known = state_.agreement.find(pair);
-    if (known != state_.agreement.end()) return known->second;
-    const bool together = test_against_each_other(claims_[i], claims_[k], state_.odometry, rule_).passed();
-    state_.agreement[pair] = together;
-    return together;
-  }
-
-  void believe_largest_set() {
-    std::vector<std::vector<bool>> agreeing(claims_.size(), std::vector<bool>(claims_.size(), false));
-    std::vector<double> cost;
-    for (std::size_t i = 0; i < claims_.size(); ++i) {
-      cost.push_back(test_against_odometry(claims_[i], state_.odometry, rule_).value);
-      for (std::size_t k = 0; k < i; ++k) agreeing[i][k] = agreeing[k][i] = agree(i, k);
-    }
-    believed_ = largest_agreeing_set(agreeing, cost);
-  }
-
-  ConsistencyRule rule_;
-  const BackendConfig& config_;
-  SmootherState& state_;
-  std::vector<std::int32_t> numbers_;  ///< of the loops that testify
-  std::vector<LoopClaim> claims_;      ///< theirs
-  std::vector<std::size_t> believed_;  ///< places in claims_, ascending
-};
+/// The graph knows better with every loop: one that it contradicted, by turns, is asked again.
+void try_again_one(SmootherState& state) {
+  if (state.waiting.empty()) return;
+  const auto turn = static_cast<std::size_t>(state.nodes.back().end.id) % state.waiting.size();
+  state.waiting[turn].is_contradicted = false;
+}
 
 /// Takes out, worst first, every loop that the graph contradicts.
 void withdraw_contradicted(double newest_rise, const BackendConfig& config, IncrementalSolver& solver,
@@ -140,33 +58,38 @@ void withdraw_contradicted(double newest_rise, const BackendConfig& config, Incr
                                 worst->chi_square, worst->bound),
                     solver, state);
     note(loop, {worst->chi_square, worst->bound});
-    events.push_back(std::move(loop));
+    wait_outside(std::move(loop), true, state, events);
     // With the culprit gone, what the newest loop had raised says nothing any more; its own error does.
     newest_rise = 0.0;
   }
 }
 
 /// Loops in the graph that the larger set contradicts go back among those that wait.
-void withdraw_outvoted(const Hearing& hearing, IncrementalSolver& solver, SmootherState& state, LoopEvents& events) {
+void withdraw_outvoted(const LoopHearing& hearing, IncrementalSolver& solver, SmootherState& state,
+                       LoopEvents& events) {
   for (std::size_t i = state.loops.size(); i-- > 0;) {
     if (!hearing.heard(state.loops[i].number) || hearing.believed(state.loops[i].number)) continue;
     GraphLoop loop = leave_graph(
         i, std::format("withdrawn: contradicts {} loops that agree with each other", hearing.believed_count()), solver,
         state);
-    events.push_back(loop);
-    loop.result.stage = LoopStage::kVerified;
-    state.waiting.push_back(std::move(loop));
+    wait_outside(std::move(loop), false, state, events);
   }
 }
 
 /// Whatever still waits says why, once.
-void explain_waiting(const Hearing& hearing, SmootherState& state, LoopEvents& events) {
+void explain_waiting(const LoopHearing& hearing, SmootherState& state, LoopEvents& events) {
   for (GraphLoop& loop : state.waiting) {
     if (!hearing.heard(loop.number)) continue;
-    const LoopReason reason = hearing.believed(loop.number) ? LoopReason::kNeedsSupport : LoopReason::kContradictsLoops;
+    const LoopReason reason = loop.is_contradicted            ? LoopReason::kContradictsGraph
+                              : hearing.believed(loop.number) ? LoopReason::kNeedsSupport
+                                                              : LoopReason::kContradictsLoops;
     const bool news = loop.result.reason != reason;
     loop.result.reason = reason;
     loop.result.reason_text = text(reason);
+    if (loop.is_contradicted) {
+      loop.result.reason_text += std::format(": chi-square {:.1f}, at most {:.1f} is believed", loop.result.chi_square,
+                                             loop.result.chi_square_bound);
+    }
     if (news) events.push_back(loop);
   }
 }
@@ -181,29 +104,115 @@ void forget_oldest_waiting(SmootherState& state, LoopEvents& events) {
   }
 }
 
-void enter_believed(const Hearing& hearing, const BackendConfig& config, IncrementalSolver& solver,
+/// Moves a loop that waits into the graph, and out of it what it contradicts.
+void let_in(std::vector<GraphLoop>::iterator waiting, const BackendConfig& config, IncrementalSolver& solver,
+            SmootherState& state, LoopEvents& events) {
+  GraphLoop entering = std::move(*waiting);
+  state.waiting.erase(waiting);
+  entering.is_contradicted = false;
+  const LoopEntry entry = enter_graph(entering, config, solver, state);
+  if (!entry.entered) {
+    events.push_back(std::move(entering));
+    events.back().result.reason = LoopReason::kSolverRefused;
+    events.back().result.reason_text = entry.refusal;
+    return;
+  }
+  state.last_loop_id = std::max(state.last_loop_id, entering.result.from_id);
+  events.push_back(state.loops.back());
+  withdraw_contradicted(entry.rise, config, solver, state, events);
+}
+
+void enter_believed(const LoopHearing& hearing, const BackendConfig& config, IncrementalSolver& solver,
                     SmootherState& state, LoopEvents& events) {
-  const auto deserves = [&](const GraphLoop& loop) {
-    return hearing.believed(loop.number) && hearing.supported(loop.number);
+  const ConsistencyRule rule = rule_of(config);
+  std::vector<std::int32_t> entered;  // once each, or loops that contradict each other might take turns without end
+  const auto deserves = [&](GraphLoop& loop) {
+    if (loop.is_contradicted || std::ranges::contains(entered, loop.number) || !hearing.believed(loop.number) ||
+        !hearing.supported(loop.number))
+      return false;
+    const GraphOpinion opinion = opinion_on(loop, rule, solver, state);
+    loop.is_contradicted = !opinion.test.passed();
+    if (loop.is_contradicted) note(loop, opinion.test);
+    return !loop.is_contradicted;
   };
   // One that enters may support those that waited before it.
   for (auto next = std::ranges::find_if(state.waiting, deserves); next != state.waiting.end();
        next = std::ranges::find_if(state.waiting, deserves)) {
-    GraphLoop entering = std::move(*next);
-    state.waiting.erase(next);
-    const LoopEntry entry = enter_graph(entering, config, solver, state);
-    if (!entry.entered) {
-      events.push_back(std::move(entering));
-      events.back().result.reason = LoopReason::kSolverRefused;
-      events.back().result.reason_text = entry.refusal;
-      continue;
-    }
-    state.last_loop_id = std::max(state.last_loop_id, entering.result.from_id);
-    events.push_back(state.loops.back());
-    withdraw_contradicted(entry.rise, config, solver, state, events);
+    entered.push_back(next->number);
+    let_in(next, config, solver, state, events);
   }
-  explain_waiting(hearing, state, events);
-  forget_oldest_waiting(state, events);
+}
+
+/// Loops that the graph contradicts, but that agree with each other, may be the true ones.
+void challenge(const std::vector<GraphLoop>& challengers, const BackendConfig& config, IncrementalSolver& solver,
+               SmootherState& state, LoopEvents& events) {
+  if (challengers.size() < 2) return;
+  const std::optional<LoopExchange> exchange = better_exchange(challengers, config, solver, state);
+  if (!exchange) return;
+  for (const std::int32_t leaving : exchange->leaving) {
+    const auto at = std::ranges::find(state.loops, leaving, &GraphLoop::number);
+    if (at == state.loops.end()) continue;
+    wait_outside(leave_graph(static_cast<std::size_t>(at - state.loops.begin()),
+                             std::format("withdrawn: {} loops that contradict it agree with each other",
+                                         exchange->entering.size()),
+                             solver, state),
+                 true, state, events);
+  }
+  for (const std::int32_t entering : exchange->entering) {
+    const auto at = std::ranges::find(state.waiting, entering, &GraphLoop::number);
+    if (at != state.waiting.end()) let_in(at, config, solver, state, events);
+  }
+}
+
+void keep(GraphLoop& loop, const SmootherState& state, LoopEvents& events) {
+  loop.result.stage = LoopStage::kKept;
+  loop.result.reason = LoopReason::kKept;
+  loop.result.reason_text =
+      std::format("kept: not contradicted by {} keyframes", state.nodes.back().end.id - loop.entered_id);
+  events.push_back(loop);
+}
+
+/// Loops that have stood their trial are kept: where odometry cannot tell, once the graph can without those beside it
+/// that say the same. One such loop a time is looked at, with its group.
+void end_trials(const BackendConfig& config, IncrementalSolver& solver, SmootherState& state, LoopEvents& events) {
+  const ConsistencyRule rule = rule_of(config);
+  const double root_of_bound = std::sqrt(rule.bounds.of(6));
+  const std::int32_t newest = state.nodes.back().end.id;
+  std::vector<std::size_t> open;
+  for (std::size_t i = 0; i < state.loops.size(); ++i) {
+    GraphLoop& loop = state.loops[i];
+    if (loop.result.stage != LoopStage::kOnTrial || newest - loop.entered_id < config.loop_trial_keyframes) continue;
+    const double open_m =
+        open_distance(state.place_of(loop.result.from_id), state.place_of(loop.result.to_id), state.odometry, rule);
+    if (root_of_bound * open_m <= config.loop_support_beyond_m) {
+      keep(loop, state, events);
+    } else {
+      open.push_back(i);
+    }
+  }
+  if (open.empty()) return;
+  const std::size_t turn = static_cast<std::size_t>(newest) % open.size();
+  std::optional<OutsideView> view = seen_from_outside(group_of(open[turn], rule, state), config, solver, state);
+  if (!view) return;
+  std::ranges::sort(view->members, std::ranges::greater(), &OutsideView::Member::index);
+  std::vector<GraphLoop> contradicted;
+  for (const OutsideView::Member& member : view->members) {
+    GraphLoop& loop = state.loops[member.index];
+    if (const ChiSquareTest test = view->together.passed() ? member.opinion.test : view->together; !test.passed()) {
+      GraphLoop gone = leave_graph(
+          member.index,
+          std::format("withdrawn: only its own group speaks for it; chi-square {:.1f}, at most {:.1f} is believed",
+                      test.value, test.bound),
+          solver, state);
+      note(gone, test);
+      contradicted.push_back(gone);
+      wait_outside(std::move(gone), true, state, events);
+    } else if (loop.result.stage == LoopStage::kOnTrial &&
+               member.opinion.largest_error_m() <= config.loop_support_beyond_m) {
+      keep(loop, state, events);
+    }
+  }
+  challenge(contradicted, config, solver, state, events);
 }
 
 }  // namespace
@@ -228,25 +237,25 @@ LoopEvents admit_loop(const LoopResult& result, const WhiteningRows& rows, const
                                           odometry.value, odometry.bound);
     return {loop};
   }
+  const std::int32_t number = loop.number;
   state.waiting.push_back(std::move(loop));
   LoopEvents events;
-  const Hearing hearing(config, state);
+  LoopHearing hearing(config, state);
   withdraw_outvoted(hearing, solver, state, events);
   enter_believed(hearing, config, solver, state, events);
+  challenge(hearing.challengers(number), config, solver, state, events);
+  explain_waiting(hearing, state, events);
+  try_again_those_before(events, state);
+  forget_oldest_waiting(state, events);
   return events;
 }
 
 LoopEvents review_loops(const BackendConfig& config, IncrementalSolver& solver, SmootherState& state) {
   LoopEvents events;
   withdraw_contradicted(0.0, config, solver, state, events);
-  for (GraphLoop& loop : state.loops) {
-    const int age = state.nodes.back().end.id - loop.entered_id;
-    if (loop.result.stage != LoopStage::kOnTrial || age < config.loop_trial_keyframes) continue;
-    loop.result.stage = LoopStage::kKept;
-    loop.result.reason = LoopReason::kKept;
-    loop.result.reason_text = std::format("kept: not contradicted by {} keyframes", age);
-    events.push_back(loop);
-  }
+  end_trials(config, solver, state, events);
+  try_again_those_before(events, state);
+  try_again_one(state);
   return events;
 }
 

@@ -26,17 +26,15 @@ Matrix6d cycle_covariance(const LoopClaim& a, const LoopClaim& b, const Odometry
          from_b_start * odometry.covariance(a.to, b.to) * from_b_start.transpose();
 }
 
-double largest_position_sigma(const Matrix6d& covariance, const ConsistencyRule& rule) {
-  const Eigen::Matrix3d position = covariance.bottomRightCorner<3, 3>();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(position, Eigen::EigenvaluesOnly);
-  return rule.sigma_scale * std::sqrt(std::max(0.0, eigen.eigenvalues()(2)));
-}
-
 }  // namespace
+
+double largest_chi_square(Eigen::Index directions, double probability) {
+  return boost::math::quantile(boost::math::chi_squared(static_cast<double>(directions)), probability);
+}
 
 ChiSquareBounds::ChiSquareBounds(double probability) {
   for (std::size_t i = 1; i < bounds_.size(); ++i) {
-    bounds_[i] = boost::math::quantile(boost::math::chi_squared(static_cast<double>(i)), probability);
+    bounds_[i] = largest_chi_square(static_cast<Eigen::Index>(i), probability);
   }
 }
 
@@ -50,6 +48,12 @@ ChiSquareTest test_against_each_other(const LoopClaim& a, const LoopClaim& b, co
   const Pose around = odometry.T_from_to(a.to, b.to) * b.T_to_from * odometry.T_from_to(b.from, a.from);
   return test(body_difference(a.T_to_from, around), cycle_covariance(a, b, odometry),
               std::min(a.directions, b.directions), rule);
+}
+
+double largest_position_sigma(const Matrix6d& covariance, const ConsistencyRule& rule) {
+  const Eigen::Matrix3d position = covariance.bottomRightCorner<3, 3>();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(position, Eigen::EigenvaluesOnly);
+  return rule.sigma_scale * std::sqrt(std::max(0.0, eigen.eigenvalues()(2)));
 }
 
 double open_distance(std::size_t from, std::size_t to, const OdometryChain& odometry, const ConsistencyRule& rule) {

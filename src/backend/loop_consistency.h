@@ -24,7 +24,10 @@ struct LoopClaim {
   int directions = 6;                          ///< in which it says something
 };
 
-/// The largest chi-square that is believed of an error, by its degrees of freedom: quantiles, looked up once.
+/// The largest chi-square that is believed of an error with so many degrees of freedom: the quantile.
+[[nodiscard]] double largest_chi_square(Eigen::Index directions, double probability);
+
+/// The same for up to six degrees, looked up once.
 class ChiSquareBounds {
  public:
   explicit ChiSquareBounds(double probability);
@@ -52,6 +55,9 @@ struct ChiSquareTest {
 /// The cycle through both loops.
 [[nodiscard]] ChiSquareTest test_against_each_other(const LoopClaim& a, const LoopClaim& b,
                                                     const OdometryChain& odometry, const ConsistencyRule& rule);
+
+/// [m] Largest sigma of the position in the covariance of a relative pose, scaled by the rule.
+[[nodiscard]] double largest_position_sigma(const Matrix6d& covariance, const ConsistencyRule& rule);
 
 /// [m] Largest sigma of the place of `from` relative to `to` that odometry leaves open, scaled by the rule.
 [[nodiscard]] double open_distance(std::size_t from, std::size_t to, const OdometryChain& odometry,

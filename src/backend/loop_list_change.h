@@ -64,6 +64,7 @@ void transfer(auto& io, FieldsOf<GraphLoop> auto& loop) {
   io.matrix(loop.rows);
   io.number(loop.number);
   io.number(loop.entered_id);
+  io.number(loop.is_contradicted);
 }
 
 void transfer(auto& io, FieldsOf<LoopListChange> auto& change) {

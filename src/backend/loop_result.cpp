@@ -39,6 +39,8 @@ const char* text(LoopReason reason) {
       return "kept";
     case LoopReason::kVetoed:
       return "vetoed";
+    case LoopReason::kContradictsGraph:
+      return "contradicts the graph";
     case LoopReason::kCloudLost:
       return "the candidate's cloud is lost";
   }

@@ -29,6 +29,7 @@ enum class LoopReason : std::int8_t {
   kKept = 15,
   kVetoed = 16,
   kCloudLost = 17,
+  kContradictsGraph = 18,
 };
 
 /// How far a loop has come. The numbers are those of loop_result_t.

@@ -5,9 +5,9 @@
 #include <gtsam/nonlinear/NonlinearFactorGraph.h>
 #include <gtsam/nonlinear/Values.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "backend/graph_evidence.h"
 #include "backend/loop_consistency.h"
 #include "backend/relative_pose_factor.h"
 #include "backend/revision_report.h"
@@ -19,8 +19,6 @@ using gtsam::symbol_shorthand::X;
 
 constexpr int kUpdatesAfterLoop = 2;      // Gauss-Newton steps that follow a large correction
 constexpr std::size_t kMostSuspects = 8;  // whose cost is computed; the others' own error is small
-// A measurement that nothing else checks has leverage 1: its cost cannot be told.
-constexpr double kSmallestFreedom = 1e-6;
 
 struct Suspect {
   std::size_t index;
@@ -35,17 +33,6 @@ std::vector<Suspect> suspects_of(const ChiSquareBounds& bounds, IncrementalSolve
   }
   std::ranges::stable_sort(suspects, std::ranges::greater(), &Suspect::share);
   return suspects;
-}
-
-/// By how much the chi-square of the graph would fall without the loop.
-double cost_of(const GraphLoop& loop, const SmootherState& state, const Matrix6d& covariance) {
-  const Pose& T_map_to = state.poses[state.place_of(loop.result.to_id)].T_map_body;
-  const Pose& T_map_from = state.poses[state.place_of(loop.result.from_id)].T_map_body;
-  const Eigen::VectorXd residual = loop.rows * body_difference(loop.result.T_to_from, T_map_to.inverse() * T_map_from);
-  const Eigen::MatrixXd leverage = loop.rows * covariance * loop.rows.transpose();
-  const Eigen::Index n = leverage.rows();
-  const Eigen::MatrixXd freedom = Eigen::MatrixXd::Identity(n, n) * (1.0 + kSmallestFreedom) - leverage;
-  return residual.dot(freedom.ldlt().solve(residual));
 }
 
 }  // namespace
@@ -104,23 +91,22 @@ std::optional<ContradictedLoop> contradicted_loop(double newest_rise, const Back
   if (risen && std::ranges::find(suspects, newest, &Suspect::index) == suspects.end())
     suspects.push_back({newest, 0.0});
 
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;
-  for (const Suspect& suspect : suspects) {
-    pairs.emplace_back(X(state.loops[suspect.index].result.to_id), X(state.loops[suspect.index].result.from_id));
-  }
-  const std::vector<Matrix6d> covariances = solver.relative_covariances(pairs);
   ContradictedLoop worst{suspects.front().index, suspects.front().share * bound_of(suspects.front().index),
                          bound_of(suspects.front().index)};
   double worst_share = 0.0;
-  for (std::size_t i = 0; i < covariances.size(); ++i) {
-    const std::size_t index = suspects[i].index;
-    const double cost = cost_of(state.loops[index], state, covariances[i]);
-    if (cost / bound_of(index) <= worst_share) continue;
-    worst_share = cost / bound_of(index);
-    worst = {index, cost, bound_of(index)};
+  bool is_told = false;
+  for (const Suspect& suspect : suspects) {
+    const GraphLoop* alone = &state.loops[suspect.index];
+    const std::optional<LoopEvidence> evidence = evidence_of({&alone, 1}, solver, state);
+    if (!evidence) continue;
+    is_told = true;
+    const double cost = evidence->cost(0);
+    if (cost / bound_of(suspect.index) <= worst_share) continue;
+    worst_share = cost / bound_of(suspect.index);
+    worst = {suspect.index, cost, bound_of(suspect.index)};
   }
   // A rise alone may be the settling of what was linearised elsewhere.
-  if (!covariances.empty() && worst_share <= 1.0) return std::nullopt;
+  if (is_told && worst_share <= 1.0) return std::nullopt;
   return worst;
 }
 

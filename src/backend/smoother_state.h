@@ -30,6 +30,7 @@ struct GraphLoop {
   WhiteningRows rows;
   std::int32_t number = 0;       ///< 0, 1, 2 ... in the order of their arrival
   std::int32_t entered_id = -1;  ///< newest keyframe when it entered the graph
+  bool is_contradicted = false;  ///< by the graph, and so waits for others to stand with
 };
 
 /// A pair of keyframes that must not be closed.

@@ -158,6 +158,24 @@ TEST(Isam2, KnowsTheCovarianceOfASumOfVariables) {
   }
 }
 
+TEST(Isam2, KnowsTheCovarianceBetweenSumsOfVariables) {
+  Twins twins(1, 1);
+  for (int i = 0; i < 40; ++i) twins.append(i);
+  twins.close(39, 18);
+  const gtsam::Marginals batch(twins.theirs.getFactorsUnsafe(), twins.ours.linearisation_points());
+  const auto difference = [](int a, int b) {
+    return std::array<Isam2::Term, 2>{Isam2::Term{X(a), -gtsam::I_6x6}, Isam2::Term{X(b), gtsam::I_6x6}};
+  };
+  for (const auto& [a, b, c, d] : {std::array{3, 4, 20, 30}, {18, 39, 0, 39}, {5, 25, 30, 10}}) {
+    const gtsam::JointMarginal joint = batch.jointMarginalCovariance(
+        a == d || b == d ? gtsam::KeyVector{X(a), X(b), X(c)} : gtsam::KeyVector{X(a), X(b), X(c), X(d)});
+    const gtsam::Matrix6 expected = joint(X(b), X(d)) - joint(X(b), X(c)) - joint(X(a), X(d)) + joint(X(a), X(c));
+    const Eigen::MatrixXd between =
+        Isam2::covariance(twins.ours.root(difference(a, b)), twins.ours.root(difference(c, d)));
+    EXPECT_LT((between - expected).norm(), 1e-8 * expected.norm() + 1e-14) << a << ' ' << d;
+  }
+}
+
 TEST(Isam2, KeepsOfACliqueOnlyWhatIsAskedForAgain) {
   Twins twins(1, 1);
   for (int i = 0; i < 40; ++i) twins.append(i);

@@ -61,6 +61,16 @@ struct VagueDrive {
     return smoother.add_loop({from, to, perturbed_in_body(T_true, lie), information(0.003, 0.02)});
   }
 
+  /// A loop of a group that takes one place for another: it agrees with that from 22 to 1, which is wrong by `wrong_m`.
+  SmootherUpdate add_to_group(int from, int to, double wrong_m) {
+    const auto truth = [&](int i) { return drive.T_world_body[static_cast<std::size_t>(i)]; };
+    Vector6d lie = Vector6d::Zero();
+    lie(3) = wrong_m;
+    const Pose T_first = perturbed_in_body(truth(1).inverse() * truth(22), lie);
+    const Pose T_to_from = truth(to).inverse() * truth(1) * T_first * truth(22).inverse() * truth(from);
+    return smoother.add_loop({from, to, T_to_from, information(0.003, 0.02)});
+  }
+
   [[nodiscard]] std::vector<Pose> poses() const {
     std::vector<Pose> poses;
     for (const KeyframePose& pose : smoother.all_poses()) poses.push_back(pose.T_map_body);
@@ -106,6 +116,45 @@ TEST(LoopTrial, AWrongLoopAmongTrueOnesWaitsOutside) {
   EXPECT_TRUE(update.changed.empty());
   EXPECT_EQ(run.smoother.stats().loops_kept, 3);
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(run.poses()[i].translation, before[i].translation);
+}
+
+/// Pairs of loops are not compared, so that only the graph can tell.
+BackendConfig without_consistency() {
+  BackendConfig config = without_search();
+  config.loop_drift_scale = 100.0;
+  return config;
+}
+
+TEST(LoopTrial, WrongLoopsThatCameFirstGiveWayToMoreThatTheGraphContradicts) {
+  VagueDrive run(without_consistency());
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(run.add_to_group(22 + i, 1 + i, 2.4).loop->accepted()) << i;
+  std::vector<LoopResult> changed;
+  for (int i = 0; i < 4; ++i) {
+    const SmootherUpdate update = run.add_loop(24 + i, 3 + i, 0.0);
+    if (i < 2) {
+      EXPECT_EQ(update.loop->reason, LoopReason::kContradictsGraph) << i;
+    }
+    changed.insert(changed.end(), update.changed.begin(), update.changed.end());
+  }
+  EXPECT_EQ(std::ranges::count(changed, LoopReason::kWithdrawn, &LoopResult::reason), 2);
+  EXPECT_EQ(run.smoother.stats().loops_kept, 4);
+  EXPECT_EQ(run.smoother.stats().loops_waiting, 2);
+  const PoseGraph graph = run.smoother.pose_graph();
+  for (const PoseGraphEdge& edge : graph.edges) {
+    if (!edge.is_loop) continue;
+    EXPECT_GE(edge.to, 24);
+  }
+}
+
+TEST(LoopTrial, IsNotOverWhileOnlyNeighboursThatSayTheSameSpeakForALoop) {
+  BackendConfig config = without_search();
+  config.loop_trial_keyframes = 2;
+  config.loop_support_beyond_m = 1.0;  // odometry would let pass what is wrong by three times as much
+  VagueDrive run(config);
+  for (int i = 0; i < 3; ++i) static_cast<void>(run.add_loop(24 + i, 3 + i, 0.0));
+  EXPECT_EQ(run.smoother.stats().loops_kept, 3);
+  for (const LoopResult& change : run.add_keyframes(8)) EXPECT_NE(change.stage, LoopStage::kKept);
+  EXPECT_EQ(run.smoother.stats().loops_on_trial, 3);
 }
 
 TEST(LoopTrial, WaitsForASecondWitnessElsewhereWhereOdometryIsVague) {

@@ -86,6 +86,7 @@ TEST(LoopMessages, NumberReasonsAndStagesAsTheCoreDoes) {
   EXPECT_EQ(reason(LoopReason::kKept), loop_result_t::KEPT);
   EXPECT_EQ(reason(LoopReason::kVetoed), loop_result_t::VETOED);
   EXPECT_EQ(reason(LoopReason::kCloudLost), loop_result_t::CLOUD_LOST);
+  EXPECT_EQ(reason(LoopReason::kContradictsGraph), loop_result_t::CONTRADICTS_GRAPH);
   EXPECT_EQ(stage(LoopStage::kNone), loop_result_t::STAGE_NO_LOOP);
   EXPECT_EQ(stage(LoopStage::kVerified), loop_result_t::STAGE_VERIFIED);
   EXPECT_EQ(stage(LoopStage::kOnTrial), loop_result_t::STAGE_ON_TRIAL);
