@@ -18,20 +18,7 @@ constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a sc
 constexpr std::int64_t kMinScanPeriodUs = 8'000;           // of scans that are worth the time that matching takes
 constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
-constexpr int kScansOfMovingStart = 2;                     // one gives a velocity, the second confirms it
 constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
-
-/// The position from which a new map begins is exact by definition.
-void define_position(ErrorCovariance& covariance) {
-  constexpr double kVariance = 1e-6;  // m^2: keeps the covariance invertible
-  covariance.middleRows<3>(kPosition).setZero();
-  covariance.middleCols<3>(kPosition).setZero();
-  covariance.diagonal().segment<3>(kPosition).setConstant(kVariance);
-}
-
-double velocity_sigma(const FilterState& filter) {
-  return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
-}
 
 /// What hits the sensor does not move the vehicle as it says: the mount springs back.
 bool is_shock(const ImuSample& sample, const FrontendConfig& config) {
@@ -46,6 +33,7 @@ Lio::Lio(const FrontendConfig& config, std::int32_t session, std::string note)
     : config_(config),
       session_(session),
       initialisation_(config),
+      start_motion_(config),
       selector_(config),
       matcher_(config),
       map_(config),
@@ -59,6 +47,8 @@ void Lio::reset() {
   ++session_;
   imu_ = ImuBuffer();
   initialisation_ = ImuInitialisation(config_);
+  start_motion_ = StartMotion(config_);
+  start_finding_.clear();
   matcher_ = ScanMatcher(config_);
   map_.clear();
   keyframer_ = Keyframer(config_, session_);
@@ -85,6 +75,7 @@ LioStatus Lio::status() const {
   LioStatus status;
   status.running = running_;
   status.text = initialisation_.report();
+  if (!start_finding_.empty()) status.text += "; " + start_finding_;
   status.trust = running_ ? trust_.trust() : Trust::kDegraded;
   status.reason = running_ ? trust_.reason() : start_note_.empty() ? status.text : start_note_ + "; " + status.text;
   return status;
@@ -121,18 +112,6 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   }
   forget_old_samples();
   return result;
-}
-
-void Lio::start(const FilterState& first) {
-  filter_ = first;
-  cautious_ = first.covariance;
-  live_ = filter_.nominal;
-  running_ = true;
-  velocity_known_ = config_.start == "at_rest";
-  drift_ = MapDrift(config_.map_drift);
-  if (!start_note_.empty()) trust_.note_uncertain_start();
-  opinion_.begin(first.nominal.utime);
-  drift_.begin(filter_);
 }
 
 std::vector<ScanResult> Lio::add_scan(Scan scan) {
@@ -211,10 +190,12 @@ std::vector<CloudPoint> Lio::register_points(const Scan& scan) {
 }
 
 ScanResult Lio::process(const Scan& scan) {
-  if (!running_) return refuse(scan, ScanReason::kNotInitialised);
+  if (!running_) {
+    start_motion_.add(scan);
+    return refuse(scan, ScanReason::kNotInitialised);
+  }
   if (scan.end_utime() < filter_.nominal.utime) {
-    const bool before_start = applied_scans_ == 0 && map_.empty();
-    return refuse(scan, before_start ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
+    return refuse(scan, applied_scans_ == 0 ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
   }
   advance_to(scan.end_utime());
   const ScanSelection& selection = selector_.select(scan);
@@ -326,21 +307,6 @@ void Lio::count_correction(const MatchResult& match, double age) {
   const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
   drift_.hand_over(blind, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
   if (salient) drift_.hold_to(match.salient.mean_scan, blind, T_odom_body);
-}
-
-void Lio::follow_moving_start(ScanReason reason) {
-  if (velocity_known_) return;
-  if (reason == ScanReason::kApplied) {
-    // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
-    map_.clear();
-    velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
-  } else if (is_contradiction(reason)) {
-    map_.clear();
-  }
-  if (!map_.empty()) return;
-  // What the vehicle went before is not in this map; left in, it would count as a part of the way to the next scan.
-  define_position(filter_.covariance);
-  define_position(cautious_);
 }
 
 /// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.

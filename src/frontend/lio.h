@@ -19,6 +19,7 @@
 #include "frontend/scan_selection.h"
 #include "frontend/scan_stats.h"
 #include "frontend/second_opinion.h"
+#include "frontend/start_motion.h"
 #include "frontend/trust_monitor.h"
 #include "frontend/voxel_thinner.h"
 
@@ -112,6 +113,7 @@ class Lio {
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
   void start(const FilterState& first);
+  void ask_scans_for_motion();
   void give_up_resumption();
   void close_gap(Utime first_sample);
   enum class Silence : std::int8_t { kNone, kBridged, kTooLong };  ///< of both streams: what became of it
@@ -126,6 +128,8 @@ class Lio {
   std::int32_t session_ = 0;
   ImuBuffer imu_;
   ImuInitialisation initialisation_;
+  StartMotion start_motion_;   ///< until the start
+  std::string start_finding_;  ///< what scans said of the motion then
   ScanSelector selector_;
   Deskewer deskewer_;
   VoxelThinner thinner_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <format>
+#include <utility>
 
 namespace ignis {
 namespace {
@@ -12,7 +13,6 @@ constexpr int kScansUntilDegraded = 5;     // without a correction
 constexpr double kSecondsUntilLost = 2.0;  // without a correction
 constexpr double kSilentImuSeconds = 0.1;  // of scan time
 constexpr int kScansToConfirm = 10;        // applied ones, after silence or a loss
-constexpr int kScansToConfirmStart = 60;   // the second opinion needs 2 s, and something to go on
 constexpr double kOpinionSeconds = 2.0;    // over which scans and IMU are compared
 constexpr double kMaxDisagreement = 8.0;   // sigma
 constexpr double kStep = 1.0;              // m, in which the way driven is counted
@@ -61,13 +61,13 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   // What closed the gap says nothing about how scans and IMU agree.
   if (resumed_) corrections_.clear();
   resumed_ = false;
-  uncertain_start_ = false;
+  uncertain_start_.clear();
   contradicted_ = false;
 }
 
-void TrustMonitor::note_uncertain_start() {
-  uncertain_start_ = true;
-  scans_to_confirm_ = kScansToConfirmStart;
+void TrustMonitor::note_uncertain_start(std::string reason, int scans) {
+  uncertain_start_ = std::move(reason);
+  scans_to_confirm_ = scans;
 }
 
 void TrustMonitor::note_resumption() {
@@ -150,8 +150,8 @@ std::string TrustMonitor::reason() const {
   if (seconds_without_imu() > kSilentImuSeconds) {
     return std::format("no IMU data for {:.1f} s, going on with scans alone", seconds_without_imu());
   }
-  if (disagreement() <= kMaxDisagreement && uncertain_start_) {
-    return std::format("new session after a restart, {} applied scans to go", scans_to_confirm_);
+  if (disagreement() <= kMaxDisagreement && !uncertain_start_.empty()) {
+    return std::format("{}, {} applied scans to go", uncertain_start_, scans_to_confirm_);
   }
   if (resumed_)
     return std::format("resumed after a restart or a silence of both streams, {} applied scans to go",

@@ -56,8 +56,9 @@ class TrustMonitor {
   [[nodiscard]] bool awaits_confirmation() const { return resumed_; }
   /// What scans had made of the last seconds was taken back (see second_opinion.h).
   void note_contradiction();
-  /// A start in the middle of a drive, perhaps: to the IMU constant velocity looks like rest, and only scans tell.
-  void note_uncertain_start();
+  /// A start in the middle of a drive, perhaps: to the IMU constant velocity looks like rest, and only scans tell. So
+  /// many of them have to be applied. `reason` is for people.
+  void note_uncertain_start(std::string reason, int scans);
 
   [[nodiscard]] Trust trust() const;
   /// Why the trust is not kOk; what happened last when it is.
@@ -85,10 +86,10 @@ class TrustMonitor {
   int scans_since_applied_ = 0;
   int scans_to_confirm_ = 0;  ///< that have to be applied before the trust comes back
   bool lost_ = false;
-  bool unseen_ = false;   ///< no scan has fitted for so long that one alone does not prove the place
-  bool resumed_ = false;  ///< from a checkpoint, and not yet confirmed
-  bool uncertain_start_ = false;
-  bool contradicted_ = false;  ///< scans by the IMU, and not yet confirmed
+  bool unseen_ = false;          ///< no scan has fitted for so long that one alone does not prove the place
+  bool resumed_ = false;         ///< from a checkpoint, and not yet confirmed
+  std::string uncertain_start_;  ///< why; empty when it is none
+  bool contradicted_ = false;    ///< scans by the IMU, and not yet confirmed
   int losses_ = 0;
   double position_sigma_ = 0.0;
   double sigma_since_start_ = 0.0;
@@ -111,7 +112,7 @@ class TrustMonitor {
     io.number(monitor.scans_to_confirm_);
     io.number(monitor.lost_);
     io.number(monitor.unseen_);
-    io.number(monitor.uncertain_start_);
+    io.text(monitor.uncertain_start_);
     io.number(monitor.contradicted_);
     io.number(monitor.losses_);
     io.number(monitor.position_sigma_);

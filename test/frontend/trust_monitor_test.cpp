@@ -143,6 +143,15 @@ TEST(TrustMonitor, ScansThatKeepTakingTheVelocityAwayAreContradictedByTheImu) {
   EXPECT_GT(feed.monitor.disagreement(), 8.0);
 }
 
+TEST(TrustMonitor, AStartThatScansSawMovingIsOkAfterFortyOfThem) {
+  Feed feed;
+  feed.monitor.note_uncertain_start("scans say that it was moving", 40);
+  feed.run(39);
+  expect(feed.monitor, Trust::kDegraded, "moving, 1 applied scans to go");
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "OK");
+}
+
 TEST(TrustMonitor, CorrectionsThatCancelOutAreNoContradiction) {
   Feed feed;
   for (int i = 0; i < 60; ++i) {

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How Lio begins: with what the IMU and the scans before it say of the motion, or with a velocity that is not known.
+#include <cmath>
+
+#include "frontend/lio.h"
+#include "frontend/scan_instant.h"
+
+namespace ignis {
+namespace {
+
+constexpr int kScansOfMovingStart = 2;      // one gives a velocity, the second confirms it
+constexpr int kScansToConfirmMotion = 40;   // of an L1, as long as the second opinion looks back
+constexpr int kScansToConfirmSession = 60;  // and something to go on
+
+/// The position from which a new map begins is exact by definition.
+void define_position(ErrorCovariance& covariance) {
+  constexpr double kVariance = 1e-6;  // m^2: keeps the covariance invertible
+  covariance.middleRows<3>(kPosition).setZero();
+  covariance.middleCols<3>(kPosition).setZero();
+  covariance.diagonal().segment<3>(kPosition).setConstant(kVariance);
+}
+
+double velocity_sigma(const FilterState& filter) {
+  return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
+}
+
+}  // namespace
+
+void Lio::start(const FilterState& first) {
+  filter_ = first;
+  if (config_.start == "at_rest" && config_.use_scan_matching) ask_scans_for_motion();
+  start_motion_ = StartMotion(config_);  // its memory is needed no more
+  cautious_ = filter_.covariance;
+  live_ = filter_.nominal;
+  running_ = true;
+  velocity_known_ = config_.start == "at_rest";
+  drift_ = MapDrift(config_.map_drift);
+  if (!start_note_.empty()) trust_.note_uncertain_start("new session after a restart", kScansToConfirmSession);
+  opinion_.begin(first.nominal.utime);
+  drift_.begin(filter_);
+}
+
+/// The IMU was quiet, as at any constant speed. A vehicle that rolls begins with the map that its scans agree on: on
+/// that of a single one it would settle wherever a few planes fit. Where scans do not tell, it is taken to stand, and
+/// doubted.
+void Lio::ask_scans_for_motion() {
+  const std::optional<SteadyMotion> motion = start_motion_.find();
+  start_finding_ = motion ? describe(*motion) : "scans do not tell whether it stood";
+  if (motion && !motion->is_rolling()) return;
+  trust_.note_uncertain_start(start_finding_, kScansToConfirmMotion);
+  if (!motion) return;
+  set_rolling(filter_, *motion, config_.gravity_m);
+  start_motion_.fill(map_, *motion, filter_.nominal.utime, filter_.nominal.T_odom_body);
+  mapped_velocity_variance_ = velocity_variance(filter_.covariance);
+}
+
+void Lio::follow_moving_start(ScanReason reason) {
+  if (velocity_known_) return;
+  if (reason == ScanReason::kApplied) {
+    // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
+    map_.clear();
+    velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
+  } else if (is_contradiction(reason)) {
+    map_.clear();
+  }
+  if (!map_.empty()) return;
+  // What the vehicle went before is not in this map; left in, it would count as a part of the way to the next scan.
+  define_position(filter_.covariance);
+  define_position(cautious_);
+}
+
+}  // namespace ignis
