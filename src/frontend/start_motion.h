@@ -67,7 +67,9 @@ class StartMotion {
   void place(const Vector6d& twist);
   [[nodiscard]] double seconds_of(double scan) const;
   [[nodiscard]] Look look(const Vector6d& twist, std::size_t stride);
-  [[nodiscard]] Candidate refined(Vector6d twist, int passes);
+  [[nodiscard]] std::size_t stride_to(std::size_t points) const;
+  [[nodiscard]] Candidate refined(Vector6d twist, int passes, std::size_t stride, std::size_t last_stride);
+  [[nodiscard]] std::optional<SteadyMotion> find_rest();
 
   FrontendConfig config_;
   ScanSelector selector_;
