@@ -139,15 +139,17 @@ std::string ImuInitialisation::refusal(const Window& window) const {
         "gyro reads {:.2f} +- {:.2f} rad/s while the accelerometer is quiet: degrees per second instead of radians?",
         gyro, window.gyro_sigma);
   }
-  if (gyro > config_.rest_gyro_mean) {
-    return std::format("turning at {:.3f} rad/s (limit {:.3f})", gyro, config_.rest_gyro_mean);
-  }
+  // What the mean of white noise may be by chance is no turn: then the noise is the reason.
+  const double by_chance = 3.0 * std::sqrt(3.0 / static_cast<double>(samples_.size())) * window.gyro_noise;
+  const std::string turning = std::format("turning at {:.3f} rad/s (limit {:.3f})", gyro, config_.rest_gyro_mean);
+  if (gyro > config_.rest_gyro_mean + by_chance) return turning;
   std::string gyro_spread =
       spread_refusal("gyro", "rad/s", window.gyro_sigma, window.gyro_noise, config_.rest_gyro_sigma);
   if (!gyro_spread.empty()) return gyro_spread;
   std::string accel_spread =
       spread_refusal("accel", "m/s^2", window.accel_sigma, window.accel_noise, config_.rest_accel_sigma);
   if (!accel_spread.empty()) return accel_spread;
+  if (gyro > config_.rest_gyro_mean) return turning;
   // White noise explains a difference between the means of two halves of sqrt(4 / n) sigma; motion explains more.
   const double explained = 5.0 * std::sqrt(4.0 / static_cast<double>(samples_.size()));
   if (window.accel_drift > explained * window.accel_noise + 0.05 ||

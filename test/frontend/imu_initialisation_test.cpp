@@ -117,6 +117,24 @@ TEST(ImuInitialisation, TellsANoisySensorFromAMovingVehicle) {
   EXPECT_FALSE(shaken.contains("raise")) << shaken;
 }
 
+/// The mean of noise is not zero either. What it may be by chance is no turn.
+TEST(ImuInitialisation, TellsTheMeanOfNoiseFromATurn) {
+  const double limit = FrontendConfig{}.rest_gyro_mean;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    const std::string noisy = refusal([&](ImuSample& s, double) {
+      for (int k = 0; k < 3; ++k) s.gyro[k] += 0.03 * std::sqrt(250.0) * normal(random);
+    });
+    EXPECT_TRUE(noisy.contains("raise frontend.rest_gyro_sigma")) << noisy;
+  }
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const std::string turning =
+      refusal([&](ImuSample& s, double) { s.gyro.y() += 0.03 * std::sqrt(250.0) * normal(random) + 5.0 * limit; });
+  EXPECT_TRUE(turning.contains("turning")) << turning;
+}
+
 TEST(ImuInitialisation, KeepsWaitingAndStartsOnceItIsStill) {
   ImuInitialisation initialisation{FrontendConfig{}};
   const auto state = feed(initialisation, 6.0, [](ImuSample& s, double t) {
