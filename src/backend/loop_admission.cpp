@@ -192,15 +192,14 @@ void end_trials(const BackendConfig& config, IncrementalSolver& solver, Smoother
   }
   if (open.empty()) return;
   const std::size_t turn = static_cast<std::size_t>(newest) % open.size();
-  std::optional<OutsideView> view = seen_from_outside(group_of(open[turn], rule, state), config, solver, state);
-  if (!view) return;
-  std::ranges::sort(view->members, std::ranges::greater(), &OutsideView::Member::index);
+  std::vector<OutsideView> views = seen_from_outside(group_of(open[turn], rule, state), rule, solver, state);
+  std::ranges::sort(views, std::ranges::greater(), &OutsideView::index);
   std::vector<GraphLoop> contradicted;
-  for (const OutsideView::Member& member : view->members) {
-    GraphLoop& loop = state.loops[member.index];
-    if (const ChiSquareTest test = view->together.passed() ? member.opinion.test : view->together; !test.passed()) {
+  for (const OutsideView& view : views) {
+    GraphLoop& loop = state.loops[view.index];
+    if (const ChiSquareTest& test = view.opinion.test; !test.passed()) {
       GraphLoop gone = leave_graph(
-          member.index,
+          view.index,
           std::format("withdrawn: only its own group speaks for it; chi-square {:.1f}, at most {:.1f} is believed",
                       test.value, test.bound),
           solver, state);
@@ -208,7 +207,7 @@ void end_trials(const BackendConfig& config, IncrementalSolver& solver, Smoother
       contradicted.push_back(gone);
       wait_outside(std::move(gone), true, state, events);
     } else if (loop.result.stage == LoopStage::kOnTrial &&
-               member.opinion.largest_error_m() <= config.loop_support_beyond_m) {
+               view.opinion.largest_error_m() <= config.loop_support_beyond_m) {
       keep(loop, state, events);
     }
   }

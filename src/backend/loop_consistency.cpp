@@ -28,13 +28,9 @@ Matrix6d cycle_covariance(const LoopClaim& a, const LoopClaim& b, const Odometry
 
 }  // namespace
 
-double largest_chi_square(Eigen::Index directions, double probability) {
-  return boost::math::quantile(boost::math::chi_squared(static_cast<double>(directions)), probability);
-}
-
 ChiSquareBounds::ChiSquareBounds(double probability) {
   for (std::size_t i = 1; i < bounds_.size(); ++i) {
-    bounds_[i] = largest_chi_square(static_cast<Eigen::Index>(i), probability);
+    bounds_[i] = boost::math::quantile(boost::math::chi_squared(static_cast<double>(i)), probability);
   }
 }
 

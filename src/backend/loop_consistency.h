@@ -24,10 +24,7 @@ struct LoopClaim {
   int directions = 6;                          ///< in which it says something
 };
 
-/// The largest chi-square that is believed of an error with so many degrees of freedom: the quantile.
-[[nodiscard]] double largest_chi_square(Eigen::Index directions, double probability);
-
-/// The same for up to six degrees, looked up once.
+/// The largest chi-square that is believed of an error, by its degrees of freedom: quantiles, looked up once.
 class ChiSquareBounds {
  public:
   explicit ChiSquareBounds(double probability);

@@ -31,30 +31,20 @@ std::vector<std::size_t> group_of(std::size_t index, const ConsistencyRule& rule
   return group;
 }
 
-std::optional<OutsideView> seen_from_outside(const std::vector<std::size_t>& group, const BackendConfig& config,
-                                             const IncrementalSolver& solver, const SmootherState& state) {
-  const ConsistencyRule rule = rule_of(config);
+std::vector<OutsideView> seen_from_outside(const std::vector<std::size_t>& group, const ConsistencyRule& rule,
+                                           const IncrementalSolver& solver, const SmootherState& state) {
   std::vector<const GraphLoop*> loops;
   for (const std::size_t index : group) loops.push_back(&state.loops[index]);
   std::optional<LoopEvidence> evidence = evidence_of(loops, solver, state);
-  if (!evidence) return std::nullopt;
+  if (!evidence) return {};
   for (std::size_t i = 0; i < group.size(); ++i) evidence->move(i);
-  OutsideView view;
+  std::vector<OutsideView> views;
   for (std::size_t i = 0; i < group.size(); ++i) {
-    view.members.push_back({group[i], opinion_on(*evidence, i, rule)});
+    views.push_back({group[i], opinion_on(*evidence, i, rule)});
+    // Errors of odometry are correlated: the graph is less sure of itself than it says.
+    views.back().opinion.test.value /= rule.sigma_scale * rule.sigma_scale;
   }
-  Eigen::Index directions = 0;
-  for (std::size_t i = 0; i < group.size(); ++i) {
-    directions += evidence->directions(i);
-    view.together.value += evidence->cost(i);
-    evidence->move(i);
-  }
-  // Errors of odometry are correlated: the graph is less sure of itself than it says.
-  const double believed_more = rule.sigma_scale * rule.sigma_scale;
-  for (OutsideView::Member& member : view.members) member.opinion.test.value /= believed_more;
-  view.together.value /= believed_more;
-  view.together.bound = largest_chi_square(directions, config.loop_consistency_probability);
-  return view;
+  return views;
 }
 
 }  // namespace ignis

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
 #include <vector>
 
-#include "backend/backend_config.h"
 #include "backend/graph_evidence.h"
 #include "backend/incremental_solver.h"
 #include "backend/smoother_state.h"
@@ -21,19 +19,15 @@ inline constexpr std::size_t kLargestGroup = 24;
 [[nodiscard]] std::vector<std::size_t> group_of(std::size_t index, const ConsistencyRule& rule,
                                                 const SmootherState& state);
 
-/// What the graph without the group says of it.
+/// What the graph without the group says of one of its loops.
 struct OutsideView {
-  struct Member {
-    std::size_t index = 0;
-    GraphOpinion opinion;
-  };
-  std::vector<Member> members;
-  ChiSquareTest together;  ///< many small errors alike, none of which would tell
+  std::size_t index = 0;
+  GraphOpinion opinion;
 };
 
-/// Nothing when the solver cannot tell.
-[[nodiscard]] std::optional<OutsideView> seen_from_outside(const std::vector<std::size_t>& group,
-                                                           const BackendConfig& config, const IncrementalSolver& solver,
-                                                           const SmootherState& state);
+/// Of each loop of the group. Empty when the solver cannot tell.
+[[nodiscard]] std::vector<OutsideView> seen_from_outside(const std::vector<std::size_t>& group,
+                                                         const ConsistencyRule& rule, const IncrementalSolver& solver,
+                                                         const SmootherState& state);
 
 }  // namespace ignis
