@@ -30,9 +30,9 @@ class DelayedRun(FaultRun):
         self.arrivals: list[tuple[float, float]] = []  # time of arrival and stamp [s], each with its own origin
         self.covariances = 0
         self._relay = SeededRelay(SENSOR_BUS, BUS, SENSOR, (), disturbance, SEED)
-        self.bus.subscribe("LIO_STATE", self._on_state).set_queue_capacity(20_000)
+        self.bus.subscribe("LIO_STATE", self._note_arrival).set_queue_capacity(20_000)
 
-    def _on_state(self, _: str, data: bytes) -> None:
+    def _note_arrival(self, _: str, data: bytes) -> None:
         state = types.state_t.decode(data)
         self.arrivals.append((time.monotonic(), 1e-6 * state.utime))
         self.covariances += state.covariance_valid
