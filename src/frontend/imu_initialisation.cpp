@@ -141,7 +141,7 @@ std::string ImuInitialisation::refusal(const Window& window) const {
   }
   // What the mean of white noise may be by chance is no turn: then the noise is the reason.
   const double by_chance = 3.0 * std::sqrt(3.0 / static_cast<double>(samples_.size())) * window.gyro_noise;
-  const std::string turning = std::format("turning at {:.3f} rad/s (limit {:.3f})", gyro, config_.rest_gyro_mean);
+  std::string turning = std::format("turning at {:.3f} rad/s (limit {:.3f})", gyro, config_.rest_gyro_mean);
   if (gyro > config_.rest_gyro_mean + by_chance) return turning;
   std::string gyro_spread =
       spread_refusal("gyro", "rad/s", window.gyro_sigma, window.gyro_noise, config_.rest_gyro_sigma);
