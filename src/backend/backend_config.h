@@ -122,8 +122,9 @@ struct BackendConfig {
     visit.number("loop_support_apart_m", self.loop_support_apart_m, {0.0, 1000.0}, "m",
                  "the second one, unless it is in the graph already, at both ends at least so far from the first: "
                  "nearby it would look the same in any place that looks alike");
-    visit.integer("loop_trial_keyframes", self.loop_trial_keyframes, {1, 10000}, "keyframes",
-                  "a loop on trial that so many later keyframes do not contradict is kept");
+    visit.integer(
+        "loop_trial_keyframes", self.loop_trial_keyframes, {1, 10000}, "keyframes",
+        "a loop on trial that so many later keyframes do not contradict is kept, once its place is pinned down");
     visit.number("shadow_swap_m", self.shadow_swap_m, {1e-6, 10.0}, "m",
                  "the batch solution replaces the incremental one when a position differs by more");
     visit.number("shadow_swap_rad", self.shadow_swap_rad, {1e-7, 1.0}, "rad", "the same for an attitude");

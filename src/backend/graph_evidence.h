@@ -20,9 +20,10 @@ namespace ignis {
 /// The tests of loops against each other and against the odometry, as configured.
 [[nodiscard]] ConsistencyRule rule_of(const BackendConfig& config);
 
+/// What it claims, by the places of its ends in the chain.
 [[nodiscard]] LoopClaim claim_of(const GraphLoop& loop, const SmootherState& state);
 
-/// Nothing when the solver cannot tell.
+/// The loops beside each other, linearised where the solver's factors are. Nothing when the solver cannot tell.
 [[nodiscard]] std::optional<LoopEvidence> evidence_of(std::span<const GraphLoop* const> loops,
                                                       const IncrementalSolver& solver, const SmootherState& state);
 
@@ -31,7 +32,7 @@ struct GraphOpinion {
   /// What the chi-square would rise by with the loop: the squared Mahalanobis distance of its claim from the graph's
   /// prediction, with the covariance of both.
   ChiSquareTest test;
-  double open_m = 0.0;  ///< largest sigma of the place of its later end, scaled by the rule
+  double open_m = 0.0;  ///< [m] largest sigma of the place of its later end, scaled by the rule
 
   /// The test would have refused a loop that is wrong by more than this.
   [[nodiscard]] double largest_error_m() const;

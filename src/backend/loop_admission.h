@@ -9,7 +9,8 @@
 
 /// Which verified loops may be in the graph. A loop must agree with the odometry between its ends and belong to the
 /// largest set of loops that agree with each other; where odometry leaves much open, another member of that set must
-/// pin it down. What enters is on trial, and kept after some keyframes without contradiction.
+/// pin it down. What the graph contradicts waits for others to stand with. What enters is on trial, and kept after some
+/// keyframes without contradiction, if odometry or the graph without its neighbours that say the same is sure of it.
 namespace ignis {
 
 /// Changes of loops' stages in their order, each as it is to be published.

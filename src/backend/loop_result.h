@@ -39,7 +39,7 @@ enum class LoopStage : std::int8_t {
   kVerified = 2,   ///< confirmed by the match; waits outside of the graph
   kOnTrial = 3,    ///< in the graph
   kKept = 4,       ///< in the graph, and nothing has contradicted it for some keyframes
-  kWithdrawn = 5,  ///< taken out of the graph for good
+  kWithdrawn = 5,  ///< taken out of the graph; where loops contradict it, it waits again
 };
 
 /// The reason and the stage in words.
