@@ -137,12 +137,13 @@ class S6Supervisor:
         self.logs_hint = f"logs: {state / 'log'}/NAME/current"
 
     def running(self) -> bool:
-        """Whether an s6-svscan works on our folder."""
-        control = self.scan / ".s6-svscan" / "control"
-        if not control.exists():
+        """Whether an s6-svscan works on our folder. Nothing is written: a command right behind that to end undoes it."""
+        try:
+            # Without a reader the pipe cannot be opened for writing.
+            os.close(os.open(self.scan / ".s6-svscan" / "control", os.O_WRONLY | os.O_NONBLOCK))
+        except OSError:
             return False
-        # Without a reader the pipe cannot be opened for writing.
-        return subprocess.run(["s6-svscanctl", "-a", str(self.scan)], capture_output=True, check=False).returncode == 0
+        return True
 
     def start(self, seconds: float) -> list[str]:
         """Writes the service folders, starts s6-svscan and waits until each process has said that it is ready."""

@@ -5,7 +5,9 @@ import os
 import random
 import select
 import shutil
+import signal
 import subprocess
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +25,7 @@ BUSY_S = 1.5  # that a busy machine may add
 STARTS = 5
 LOOP_S = 10.0
 STOPS = 400
+ASLEEP_S = 1.0
 PAUSE_S = 1.5  # less than the pause takes
 TAI_AHEAD = 2**62 + 10  # [s] of TAI64, before 1970
 SEED = 20261125
@@ -141,6 +144,28 @@ def test_fault_p7_a_process_that_ends_at_once_is_started_ever_later_and_the_othe
     assert said.count("no sensor today") == STARTS + 1, "without growing waits there would be one a second"
     assert "ended 4 times within a minute, at last with exitcode 3; next start in 2 s" in said
     assert "next start in 5 s" in said
+
+
+def parent_of(pid: int) -> int:
+    """The process that started this one."""
+    stat = Path(f"/proc/{pid}/stat").read_text()
+    return int(stat.rpartition(")")[2].split()[1])
+
+
+def test_fault_p7_a_stop_is_not_undone_by_the_look_whether_it_is_done(tmp_path: Path) -> None:
+    supervisor = S6Supervisor(tmp_path / "state", {"l1_driver": ["/bin/sh", "-c", "echo >&3; exec sleep 60"]}, {})
+    assert supervisor.start(LOOP_S) == []
+    shown = subprocess.check_output(["s6-svstat", "-o", "pid", str(supervisor.scan / "l1_driver")], text=True)
+    scanner = parent_of(parent_of(int(shown)))
+    # What is written to one that does not get round to reading is read in one go.
+    os.kill(scanner, signal.SIGSTOP)
+    waking = threading.Timer(ASLEEP_S, os.kill, (scanner, signal.SIGCONT))
+    waking.start()
+    stopping = time.monotonic()
+    supervisor.stop()
+    waking.join()
+    assert time.monotonic() - stopping < 8.0
+    assert not supervisor.running()
 
 
 def test_fault_p7_a_stop_ends_the_pause_before_a_start_whenever_it_comes(tmp_path: Path) -> None:
