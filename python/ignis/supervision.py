@@ -137,7 +137,7 @@ class S6Supervisor:
         self.logs_hint = f"logs: {state / 'log'}/NAME/current"
 
     def running(self) -> bool:
-        """Whether an s6-svscan works on our folder. Nothing is written: a command right behind that to end undoes it."""
+        """Whether an s6-svscan works on our folder. Asked without a command: one behind that to end undoes it."""
         try:
             # Without a reader the pipe cannot be opened for writing.
             os.close(os.open(self.scan / ".s6-svscan" / "control", os.O_WRONLY | os.O_NONBLOCK))
