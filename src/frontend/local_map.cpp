@@ -221,6 +221,21 @@ std::optional<Eigen::Vector3d> LocalMap::nearest(const Eigen::Vector3d& query, d
   return query + best->cast<double>();
 }
 
+std::optional<Eigen::Vector3d> LocalMap::own_voxel(const Eigen::Vector3d& query, float min_points) const {
+  const Eigen::Vector3i voxel = voxel_of(query, voxel_size_);
+  const Eigen::Vector3i coordinate = cube_of(voxel);
+  const Eigen::Vector3i parent = cube_of(coordinate);
+  const Region* region = find_region(parent);
+  const int block_bit = bit_of(coordinate - kEdge * parent);
+  if (region == nullptr || (region->present >> block_bit & 1U) == 0) return std::nullopt;
+  const Block& block = blocks_[static_cast<std::size_t>(region->blocks[block_bit])];
+  const int bit = bit_of(voxel - kEdge * coordinate);
+  if ((block.confirmed >> bit & 1U) == 0) return std::nullopt;
+  const Voxel found = block.voxel(bit);
+  if (found.weight < min_points) return std::nullopt;
+  return kEdge * voxel_size_ * coordinate.cast<double>() + found.point.cast<double>();
+}
+
 void LocalMap::slide(const Eigen::Vector3d& position, int sure_since) {
   if (!has_slid_) {
     has_slid_ = true;

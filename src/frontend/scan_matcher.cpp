@@ -32,6 +32,7 @@ constexpr double kKnownShift = 0.1;         // m: a direction that salient point
 // Mean squared sensitivity per point of a shift that planes which are none have held: 0.001 to 0.01 in a bare corridor,
 // 0.003 to 0.02 behind a forklift. The door frames of a corridor make 0.03 and more.
 constexpr double kWeakShift = 0.02;
+constexpr float kPointsOfAMean = 5.0F;      // a voxel of fewer says less about a place than its neighbourhood does
 constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
 constexpr auto kAll = [](const auto&) { return true; };
 
@@ -116,7 +117,8 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
       const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
-      constraints_.push_back({point_body, plane, plane.normal.dot(queries_[i] + plane.offset), smoothness, 1.0});
+      const double distance = distance_along(plane, smoothness, queries_[i], map);
+      constraints_.push_back({point_body, plane, distance, smoothness, 1.0});
     }
   }
   leave_out_new_surfaces(map.scans());
@@ -132,6 +134,14 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   mean_range_ = constraints_.empty() ? 1.0 : std::max(range_sum / count, 0.1);
   mean_map_scan_ = scan_sum / count;
   pooled_variance_ = variance_sum / count;
+}
+
+double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
+                                   const LocalMap& map) {
+  const double of_all = plane.normal.dot(query + plane.offset);
+  if (smoothness == 1.0) return of_all;
+  const std::optional<Eigen::Vector3d> own = map.own_voxel(query, kPointsOfAMean);
+  return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
 }
 
 void ScanMatcher::leave_out_new_surfaces(int newest_scan) {

@@ -63,7 +63,7 @@ class ScanMatcher {
   struct Constraint {
     Eigen::Vector3d point_body;
     PlaneFit plane;         ///< odom axes
-    double plane_distance;  ///< [m] normal . centroid
+    double plane_distance;  ///< [m] normal . where it lies
     double smoothness;      ///< of the plane, (0, 1]
     double weight;          ///< this times the observability weight
   };
@@ -76,6 +76,11 @@ class ScanMatcher {
   };
 
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
+  /// Where a plane lies along its normal [m]. Of a smooth one all neighbours tell. Where an edge or a corner passes for
+  /// a plane, their mean is off to one side, before the edge or behind it, alike in scan after scan: the rougher the
+  /// plane, the more is told by the points of the query's own voxel, which lie where the query does.
+  [[nodiscard]] static double distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
+                                             const LocalMap& map);
   /// Drops the constraints to surfaces that the map has held for a moment only, as long as enough is left without them.
   /// What moves is always new where it is. It is a small part of a scan, yet along an aisle whose ends are out of range
   /// a forklift that goes by can be most of what faces along the way, and it says what its own speed is. What stands is

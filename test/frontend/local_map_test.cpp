@@ -198,6 +198,27 @@ TEST(LocalMap, FindsTheNearestConfirmedPointThatABruteForceSearchFinds) {
   }
 }
 
+TEST(LocalMap, FindsTheMeanOfTheVoxelThatAPointLiesInOnceItIsOfEnoughPoints) {
+  FrontendConfig config;
+  config.map_average_points = 60000;
+  LocalMap map(config);
+  map.insert(random_points(1, 6000, 1.0F), {}, true);
+  const std::vector<Eigen::Vector3d> all = map.points();
+  map.insert(random_points(5, 6000, 1.5F), {}, false);
+  const auto voxel_of = [](const Eigen::Vector3d& point) -> Eigen::Array3d { return (point / 0.2).array().floor(); };
+  for (const Eigen::Vector3f& point : random_points(2, 400, 1.5F)) {
+    const Eigen::Vector3d query = point.cast<double>();
+    const auto expected = std::ranges::find_if(
+        all, [&](const Eigen::Vector3d& mean) { return (voxel_of(mean) == voxel_of(query)).all(); });
+    const bool is_enough = expected != all.end() && map.gather(*expected, 1e-4).weight >= 5.0;
+    const std::optional<Eigen::Vector3d> found = map.own_voxel(query, 5.0F);
+    ASSERT_EQ(found.has_value(), is_enough);
+    if (found) {
+      EXPECT_EQ(*found, *expected);
+    }
+  }
+}
+
 TEST(LocalMap, KeepsThePointNearestTheVoxelCentre) {
   LocalMap map(FrontendConfig{});
   map.insert(std::vector<Eigen::Vector3f>{{0.01F, 0.01F, 0.01F}, {0.11F, 0.1F, 0.1F}, {0.15F, 0.1F, 0.1F}}, {}, true);

@@ -150,5 +150,36 @@ TEST(RoughPlanes, DoNotMakeTheSmoothOnesPassForNoisy) {
   EXPECT_GT(where_they_do_not, 0.7 * where_they_fit);
 }
 
+/// How much too high a standing sensor takes itself to be above strips of floor, each a voxel wide and every other one
+/// 4 cm higher, when it sees the lower ones alone: to each neighbourhood they are one rough plane halfway up.
+double height_over_strips(double smooth_plane_m) {
+  FrontendConfig config = test::tuned_config();
+  config.smooth_plane_m = smooth_plane_m;
+  std::vector<Eigen::Vector3f> mapped;
+  std::vector<Eigen::Vector3f> seen;
+  for (int i = -40; i < 40; ++i) {
+    for (int k = -40; k < 40; ++k) {
+      const auto x = 0.05F * (static_cast<float>(i) + 0.5F);
+      const auto z = 0.05F * (static_cast<float>(k) + 0.5F);
+      const bool low = static_cast<int>(std::floor(x / 0.2F)) % 2 == 0;
+      mapped.emplace_back(x, low ? -1.0F : -0.96F, z);
+      if (low) seen.push_back(mapped.back());
+    }
+  }
+  LocalMap map(config);
+  for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
+  FilterState predicted;
+  predicted.covariance = 1e-2 * ErrorCovariance::Identity();
+  const MatchResult result = ScanMatcher(config).match(predicted, Pose(), seen, map);
+  EXPECT_TRUE(result.stats.applied());
+  return result.filter.nominal.T_odom_body.translation.y();
+}
+
+TEST(RoughPlanes, LieWhereTheVoxelOfThePointSaysAndNotWhereItsNeighboursDo) {
+  const double by_all_neighbours = height_over_strips(0.0);
+  EXPECT_GT(by_all_neighbours, 0.008);
+  EXPECT_LT(std::abs(height_over_strips(0.005)), 0.4 * by_all_neighbours);
+}
+
 }  // namespace
 }  // namespace ignis
