@@ -79,6 +79,13 @@ NavState predict_backward(const NavState& state, const InertialInput& input, dou
   return before;
 }
 
+void turn_gravity(ErrorCovariance& covariance, const Eigen::Matrix3d& turn) {
+  Eigen::Matrix<double, 2, 3> tilt_by_turn = Eigen::Matrix<double, 2, 3>::Zero();
+  tilt_by_turn(0, 2) = -1.0;
+  tilt_by_turn(1, 0) = 1.0;
+  covariance.block<2, 2>(kGravityTilt, kGravityTilt) += tilt_by_turn * turn * tilt_by_turn.transpose();
+}
+
 Eigen::Matrix<double, 3, 2> gravity_direction_by_tilt(const NavState& state) {
   Eigen::Matrix<double, 3, 2> derivative = Eigen::Matrix<double, 3, 2>::Zero();
   derivative(0, 0) = 1.0;

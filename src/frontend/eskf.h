@@ -55,6 +55,9 @@ struct InertialInput {
 /// The state from which predict_nominal with the same input leads to `state`.
 [[nodiscard]] NavState predict_backward(const NavState& state, const InertialInput& input, double dt, double gravity);
 
+/// What was matched with has turned against gravity by an angle of this covariance [rad^2, odom axes].
+void turn_gravity(ErrorCovariance& covariance, const Eigen::Matrix3d& turn);
+
 /// Derivative of the direction of gravity by its tilt.
 [[nodiscard]] Eigen::Matrix<double, 3, 2> gravity_direction_by_tilt(const NavState& state);
 

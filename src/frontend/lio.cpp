@@ -314,8 +314,10 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (trust_.awaits_confirmation()) return;
   if (match.stats.applied()) {
     if (match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
-    drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body, match.map_age_scans,
-                    blind_shifts(match.degeneracy));
+    const Eigen::Matrix3d turn = drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body,
+                                                 match.map_age_scans, blind_shifts(match.degeneracy));
+    turn_gravity(filter_.covariance, turn);
+    turn_gravity(cautious_, turn);
   }
   grow_map(cloud, match);
 }

@@ -43,13 +43,15 @@ void MapDrift::begin(const FilterState& first) {
   position_ = start_;
 }
 
-void MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans,
-                        std::span<const Eigen::Vector3d> blind) {
+Eigen::Matrix3d MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans,
+                                   std::span<const Eigen::Vector3d> blind) {
   Matrix6d measured = attitude_to_odom(T_odom_body);
   measured.bottomRightCorner<3, 3>() -= projector_on(blind);
   covariance_ = at(T_odom_body.translation);
-  covariance_ += scale_ / std::max(age_scans, 1.0) * measured * pose_covariance * measured.transpose();
+  const Matrix6d added = scale_ / std::max(age_scans, 1.0) * measured * pose_covariance * measured.transpose();
+  covariance_ += added;
   position_ = T_odom_body.translation;
+  return added.topLeftCorner<3, 3>();
 }
 
 void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,

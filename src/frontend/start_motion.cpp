@@ -44,6 +44,13 @@ constexpr double kDistance = 0.06;   // [m] sigma of a point's distance, of poin
 // empty halls; up to 1.4 in those at rest.
 constexpr double kDecisive = 2.2;
 constexpr double kDecisiveAlone = 3.5;   // where only one search led there
+// What is left may be a mirage: a speed that brings rings on floor and walls, or what lies along them, into planes.
+// kLeastFacing [s^2]: of points that face the way, with the squared time between them and their plane. 4 to 150 for
+// true speeds, up to 3 for wrong ones, with 16 beams in an empty hall.
+constexpr double kLeastFacing = 3.5;
+// Of the time over which all scans are spread about such a point, squared, how much lies beside it at rest. 0.003 to
+// 0.27 for true speeds from 0.2 m/s on, 0.54 to 1.07 for wrong ones and in corridors.
+constexpr double kMostThatRestExplains = 0.4;
 constexpr double kMeeting = 0.2;         // [m/s] between searches that led to the same speed
 constexpr double kSameSpeed = 0.3;       // [m/s] and that are on their way there
 constexpr double kStandingSpeed = 0.03;  // [m/s] scans of a vehicle that stands make up to 0.015
@@ -131,6 +138,7 @@ StartMotion::Look StartMotion::look(const Vector6d& twist, std::size_t stride) {
   Matrix6d information = prior_sigma.array().square().inverse().matrix().asDiagonal();
   Vector6d gradient = Vector6d::Zero();
   double facing = 0.0;
+  std::vector<std::size_t> witnesses;
   double roughness = 0.0;  // [m^2] sum of variances
   double count = 0.0;
   const std::span<const PlaneFit> planes = finder_.find(map_, queries_, Eigen::Vector3d::Zero());
@@ -145,7 +153,10 @@ StartMotion::Look StartMotion::look(const Vector6d& twist, std::size_t stride) {
     const double weight = static_cast<double>(stride) * smoothness / (kDistance * kDistance);
     information += weight * h * h.transpose();
     gradient += weight * h * plane.normal.dot(plane.offset);
-    if (std::abs(plane.normal.z()) > kFacing) facing += smoothness * seconds * seconds;
+    if (std::abs(plane.normal.z()) > kFacing) {
+      facing += smoothness * seconds * seconds;
+      witnesses.push_back(i * stride);
+    }
     roughness += plane.scatter[0];
     ++count;
   }
@@ -153,7 +164,9 @@ StartMotion::Look StartMotion::look(const Vector6d& twist, std::size_t stride) {
   const double mean_roughness = count > 0.0 ? roughness / count : 1.0;
   return {.step = information.ldlt().solve(gradient),
           .covariance = information.inverse(),
-          .evidence = static_cast<double>(stride) * facing / (mean_roughness * mean_roughness)};
+          .facing = static_cast<double>(stride) * facing,
+          .evidence = static_cast<double>(stride) * facing / (mean_roughness * mean_roughness),
+          .witnesses = std::move(witnesses)};
 }
 
 /// One point in so many leaves at most that many, and no less than half of them where there are more.
@@ -170,21 +183,36 @@ StartMotion::Candidate StartMotion::refined(Vector6d twist, int passes, std::siz
     twist += step;
     if (step.tail<3>().norm() < kConvergedSpeed && step.head<3>().norm() < kConvergedTurn) break;
   }
-  const Look last = look(twist, last_stride);
-  return {twist, last.covariance, last.evidence};
+  return {twist, look(twist, last_stride)};
 }
 
 /// Nothing where it is not plain that it stood.
 std::optional<SteadyMotion> StartMotion::find_rest() {
   const std::size_t stride = stride_to(kPointsAtRest);
   const Candidate rest = refined(Vector6d::Zero(), kPasses, stride, stride);
-  const SteadyMotion motion = with_floor(rest.twist, rest.covariance);
+  const SteadyMotion motion = with_floor(rest.twist, rest.last.covariance);
   if (motion.is_rolling()) return std::nullopt;
   for (double speed = kSlowest; speed <= kFastest; speed += kSpeedStepAtRest) {
     const bool is_other = std::abs(speed) > 0.5 * kSpeedStepAtRest;
-    if (is_other && rest.evidence < kDecisiveAtRest * look(at_speed(speed), stride).evidence) return std::nullopt;
+    if (is_other && rest.last.evidence < kDecisiveAtRest * look(at_speed(speed), stride).evidence) return std::nullopt;
   }
-  return rest.evidence > 0.0 ? std::optional(motion) : std::nullopt;
+  return rest.last.evidence > 0.0 ? std::optional(motion) : std::nullopt;
+}
+
+/// What faces the way and lies at rest where other moments saw it too is no surface that the vehicle came nearer to.
+bool StartMotion::rest_explains(std::span<const std::size_t> witnesses) {
+  place(Vector6d::Zero());
+  const double middle = 0.5 * samples_.front().seconds;
+  double at_rest = 0.0;
+  double in_all = 0.0;
+  for (const std::size_t i : witnesses) {
+    const NeighbourMoments here = map_.gather(samples_[i].point, config_.voxel_size_m);
+    if (here.count == 0) continue;
+    const double apart = samples_[i].seconds - seconds_of(here.scan_sum / here.weight);
+    at_rest += apart * apart;
+    in_all += (samples_[i].seconds - middle) * (samples_[i].seconds - middle);
+  }
+  return !(at_rest < kMostThatRestExplains * in_all);
 }
 
 std::optional<SteadyMotion> StartMotion::find() {
@@ -195,12 +223,13 @@ std::optional<SteadyMotion> StartMotion::find() {
   for (double speed = kSlowest; speed <= kFastest; speed += kSpeedStep) {
     candidates.push_back(refined(at_speed(speed), kPasses, stride, stride));
   }
-  std::ranges::sort(candidates, std::ranges::greater(), &Candidate::evidence);
+  const auto evidence = [](const Candidate& candidate) { return candidate.last.evidence; };
+  std::ranges::sort(candidates, std::ranges::greater(), evidence);
   const auto finalists = std::span(candidates).first(kFinalists);
   for (Candidate& candidate : finalists) {
     candidate = refined(candidate.twist, kFinalPasses, stride, 1);
   }
-  const Candidate& best = *std::ranges::max_element(finalists, {}, &Candidate::evidence);
+  const Candidate& best = *std::ranges::max_element(finalists, {}, evidence);
   const auto is_near = [&](const Candidate& other, double within) {
     return std::abs(forward_speed(other.twist) - forward_speed(best.twist)) < within;
   };
@@ -208,10 +237,12 @@ std::optional<SteadyMotion> StartMotion::find() {
       std::ranges::count_if(candidates, [&](const Candidate& other) { return is_near(other, kMeeting); }) > 1;
   const double decisive = is_met_again ? kDecisive : kDecisiveAlone;
   const bool is_decisive = std::ranges::all_of(candidates, [&](const Candidate& other) {
-    return is_near(other, kSameSpeed) || best.evidence > decisive * other.evidence;
+    return is_near(other, kSameSpeed) || evidence(best) > decisive * evidence(other);
   });
   if (!is_decisive) return std::nullopt;
-  return with_floor(best.twist, best.covariance);
+  const SteadyMotion motion = with_floor(best.twist, best.last.covariance);
+  const bool is_mirage = motion.is_rolling() && (best.last.facing < kLeastFacing || rest_explains(best.last.witnesses));
+  return is_mirage ? std::nullopt : std::optional(motion);
 }
 
 void StartMotion::fill(LocalMap& map, const SteadyMotion& motion, Utime now, const Pose& T_odom_body) {

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ struct SteadyMotion {
 /// Each speed that it may have had puts the points of these scans into one cloud. Under the true one, surfaces that
 /// face along the way lie where each scan saw them. Under any other they are smeared, or what is left of them comes
 /// from single moments and says nothing of the speed. So from speeds on a grid Gauss-Newton refines the twist, and what
-/// the planes that face along the way say of the speed is compared. That a cloud is crisp under the right parameters
+/// the planes that face along the way say of the speed is compared. And what they are made of must not lie at rest where
+/// scans of all moments saw it: then it is the sensor's own pattern on what runs along the way. That a cloud is crisp under the right parameters
 /// only: M. Sheehan, A. Harrison, P. Newman, "Self-calibration for a 3D laser", IJRR 31(5), 2012.
 class StartMotion {
  public:
@@ -56,12 +58,13 @@ class StartMotion {
   struct Look {
     Vector6d step = Vector6d::Zero();  ///< that makes the planes thinner
     Matrix6d covariance = Matrix6d::Identity();
-    double evidence = 0.0;  ///< what planes that face along the way say of the speed, relative
+    double facing = 0.0;    ///< [s^2] of points whose planes face along the way: time between the two, squared
+    double evidence = 0.0;  ///< what they say of the speed, relative
+    std::vector<std::size_t> witnesses;  ///< those points, in samples_
   };
   struct Candidate {
     Vector6d twist;
-    Matrix6d covariance;
-    double evidence;
+    Look last;
   };
 
   void place(const Vector6d& twist);
@@ -70,6 +73,7 @@ class StartMotion {
   [[nodiscard]] std::size_t stride_to(std::size_t points) const;
   [[nodiscard]] Candidate refined(Vector6d twist, int passes, std::size_t stride, std::size_t last_stride);
   [[nodiscard]] std::optional<SteadyMotion> find_rest();
+  [[nodiscard]] bool rest_explains(std::span<const std::size_t> witnesses);
 
   FrontendConfig config_;
   ScanSelector selector_;
