@@ -38,7 +38,7 @@ class MapDrift {
   /// made of points of the age `age_scans` on average. It did not observe shifts along the unit axes `blind` (odom).
   /// What that adds to the covariance of the map's turn [rad^2, odom axes].
   Eigen::Matrix3d add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans,
-                std::span<const Eigen::Vector3d> blind);
+                           std::span<const Eigen::Vector3d> blind);
 
   /// Remembers how well a position was known [m^2, odom axes, published covariance] when the map's scan number
   /// `scan` was placed there, and which shifts it did not observe. Numbers ascend; a smaller one begins a new map. Of

@@ -32,7 +32,7 @@ constexpr double kKnownShift = 0.1;         // m: a direction that salient point
 // Mean squared sensitivity per point of a shift that planes which are none have held: 0.001 to 0.01 in a bare corridor,
 // 0.003 to 0.02 behind a forklift. The door frames of a corridor make 0.03 and more.
 constexpr double kWeakShift = 0.02;
-constexpr float kPointsOfAMean = 5.0F;      // a voxel of fewer says less about a place than its neighbourhood does
+constexpr float kPointsOfAMean = 5.0F;       // a voxel of fewer says less about a place than its neighbourhood does
 constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
 constexpr auto kAll = [](const auto&) { return true; };
 

@@ -43,7 +43,7 @@ constexpr double kDistance = 0.06;   // [m] sigma of a point's distance, of poin
 // the way, with an L1 and one search alone from 3.9. Up to 2.2 for a wrong speed, of one search alone, in corridors and
 // empty halls; up to 1.4 in those at rest.
 constexpr double kDecisive = 2.2;
-constexpr double kDecisiveAlone = 3.5;   // where only one search led there
+constexpr double kDecisiveAlone = 3.5;  // where only one search led there
 // What is left may be a mirage: a speed that brings rings on floor and walls, or what lies along them, into planes.
 // kLeastFacing [s^2]: of points that face the way, with the squared time between them and their plane. 4 to 150 for
 // true speeds, up to 3 for wrong ones, with 16 beams in an empty hall.

@@ -33,9 +33,10 @@ struct SteadyMotion {
 /// Each speed that it may have had puts the points of these scans into one cloud. Under the true one, surfaces that
 /// face along the way lie where each scan saw them. Under any other they are smeared, or what is left of them comes
 /// from single moments and says nothing of the speed. So from speeds on a grid Gauss-Newton refines the twist, and what
-/// the planes that face along the way say of the speed is compared. And what they are made of must not lie at rest where
-/// scans of all moments saw it: then it is the sensor's own pattern on what runs along the way. That a cloud is crisp under the right parameters
-/// only: M. Sheehan, A. Harrison, P. Newman, "Self-calibration for a 3D laser", IJRR 31(5), 2012.
+/// the planes that face along the way say of the speed is compared. And what they are made of must not lie at rest
+/// where scans of all moments saw it: then it is the sensor's own pattern on what runs along the way. That a cloud is
+/// crisp under the right parameters only: M. Sheehan, A. Harrison, P. Newman, "Self-calibration for a 3D laser", IJRR
+/// 31(5), 2012.
 class StartMotion {
  public:
   explicit StartMotion(const FrontendConfig& config);

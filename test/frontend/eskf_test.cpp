@@ -83,6 +83,19 @@ TEST(Eskf, RestAccelerationCovarianceIsThatOfNumericalDerivatives) {
   }
 }
 
+TEST(Eskf, ATurnOfTheMapMakesGravityInItAsUncertainAsThatTurnsIt) {
+  // One direction of turning is enough: its shifts of gravity are numerical derivatives.
+  const Eigen::Vector3d turn(0.003, 0.002, -0.001);
+  const Eigen::Vector3d moved = so3::exp(turn) * -Eigen::Vector3d::UnitY();
+  const Eigen::Vector2d tilt(moved.x(), moved.z());
+  ErrorCovariance covariance = ErrorCovariance::Identity();
+  turn_gravity(covariance, turn * turn.transpose());
+  const Eigen::Matrix2d added = covariance.block<2, 2>(kGravityTilt, kGravityTilt) - Eigen::Matrix2d::Identity();
+  EXPECT_LT((added - tilt * tilt.transpose()).norm(), 3e-8);
+  covariance.block<2, 2>(kGravityTilt, kGravityTilt).setIdentity();
+  EXPECT_TRUE(covariance.isIdentity(0.0)) << "and nothing else";
+}
+
 TEST(Eskf, DifferenceInvertsPerturbation) {
   std::mt19937 random(2);
   for (int trial = 0; trial < 20; ++trial) {
