@@ -55,7 +55,9 @@ struct InertialInput {
 /// The state from which predict_nominal with the same input leads to `state`.
 [[nodiscard]] NavState predict_backward(const NavState& state, const InertialInput& input, double dt, double gravity);
 
-/// What was matched with has turned against gravity by an angle of this covariance [rad^2, odom axes].
+/// The map, and with it odom, has turned against gravity by an angle of this covariance [rad^2, odom axes]: what bends
+/// away from level must not count as an acceleration (docs/front_end.md, Gravity in a map that bends). To first order
+/// in the tilt.
 void turn_gravity(ErrorCovariance& covariance, const Eigen::Matrix3d& turn);
 
 /// Derivative of the direction of gravity by its tilt.

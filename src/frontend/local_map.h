@@ -46,7 +46,8 @@ class LocalMap {
   /// The confirmed point nearest a point, within a radius [m]. Costs what gather costs: for rare use.
   [[nodiscard]] std::optional<Eigen::Vector3d> nearest(const Eigen::Vector3d& query, double radius) const;
 
-  /// The confirmed point of the voxel that a point lies in, if at least so many measured points are in its mean.
+  /// The confirmed point (odom, [m]) of the voxel that a point lies in; nothing where there is none, or fewer measured
+  /// points are in its mean than `min_points`.
   [[nodiscard]] std::optional<Eigen::Vector3d> own_voxel(const Eigen::Vector3d& query, float min_points) const;
 
   /// Calls of slide() that it takes to look through the map, so that no scan has to wait for all of it.

@@ -63,7 +63,7 @@ class ScanMatcher {
   struct Constraint {
     Eigen::Vector3d point_body;
     PlaneFit plane;         ///< odom axes
-    double plane_distance;  ///< [m] normal . where it lies
+    double plane_distance;  ///< [m] of the plane from the origin of odom, along its normal
     double smoothness;      ///< of the plane, (0, 1]
     double weight;          ///< this times the observability weight
   };

@@ -6,6 +6,7 @@
 #include <format>
 #include <functional>
 #include <span>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -46,7 +47,7 @@ constexpr double kDecisive = 2.2;
 constexpr double kDecisiveAlone = 3.5;  // where only one search led there
 // What is left may be a mirage: a speed that brings rings on floor and walls, or what lies along them, into planes.
 // kLeastFacing [s^2]: of points that face the way, with the squared time between them and their plane. 4 to 150 for
-// true speeds, up to 3 for wrong ones, with 16 beams in an empty hall.
+// true speeds; up to 3 for wrong ones with 16 beams in an empty hall. Along a corridor these have 5 to 24.
 constexpr double kLeastFacing = 3.5;
 // Of the time over which all scans are spread about such a point, squared, how much lies beside it at rest. 0.003 to
 // 0.27 for true speeds from 0.2 m/s on, 0.54 to 1.07 for wrong ones and in corridors.

@@ -205,7 +205,9 @@ TEST(LocalMap, FindsTheMeanOfTheVoxelThatAPointLiesInOnceItIsOfEnoughPoints) {
   map.insert(random_points(1, 6000, 1.0F), {}, true);
   const std::vector<Eigen::Vector3d> all = map.points();
   map.insert(random_points(5, 6000, 1.5F), {}, false);
-  const auto voxel_of = [](const Eigen::Vector3d& point) -> Eigen::Array3d { return (point / 0.2).array().floor(); };
+  const auto voxel_of = [&](const Eigen::Vector3d& point) -> Eigen::Array3d {
+    return (point / config.voxel_size_m).array().floor();
+  };
   for (const Eigen::Vector3f& point : random_points(2, 400, 1.5F)) {
     const Eigen::Vector3d query = point.cast<double>();
     const auto expected = std::ranges::find_if(

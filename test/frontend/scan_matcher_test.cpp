@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -111,33 +112,44 @@ struct Patches {
   float noise = 0.0F;      ///< [m] of the points that are matched with it, up and down in turn
 };
 
-/// What a standing sensor a metre above it makes of it.
-MatchResult match_over(const Patches& patches) {
-  FrontendConfig config = test::tuned_config();
-  config.smooth_plane_m = patches.smooth_plane_m;
-  std::vector<Eigen::Vector3f> mapped;
-  std::vector<Eigen::Vector3f> seen;
+/// Calls visit(x, z, i, k) for a grid of 5 cm over 4 m x 4 m.
+void for_each_point_of_a_floor(auto&& visit) {
   for (int i = -40; i < 40; ++i) {
-    for (int k = -40; k < 40; ++k) {
-      const auto x = 0.05F * (static_cast<float>(i) + 0.5F);
-      const auto z = 0.05F * (static_cast<float>(k) + 0.5F);
-      const bool rough = (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(z))) % 2 != 0;
-      const bool high = (static_cast<int>(std::floor(x / 0.1F)) + static_cast<int>(std::floor(z / 0.1F))) % 2 != 0;
-      mapped.emplace_back(x, rough ? patches.too_high + (high ? -0.98F : -1.02F) : -1.0F, z);
-      seen.emplace_back(x, -1.0F + ((i + k) % 2 != 0 ? patches.noise : -patches.noise), z);
-    }
+    for (int k = -40; k < 40; ++k)
+      visit(0.05F * (static_cast<float>(i) + 0.5F), 0.05F * (static_cast<float>(k) + 0.5F), i, k);
   }
+}
+
+/// What a standing sensor makes of points that it sees of what it has mapped in forty scans.
+MatchResult match_at_rest(double smooth_plane_m, std::span<const Eigen::Vector3f> mapped,
+                          std::span<const Eigen::Vector3f> seen, double prior_variance) {
+  FrontendConfig config = test::tuned_config();
+  config.smooth_plane_m = smooth_plane_m;
   LocalMap map(config);
   for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
   FilterState predicted;
-  predicted.covariance = 1e-4 * ErrorCovariance::Identity();
+  predicted.covariance = prior_variance * ErrorCovariance::Identity();
   MatchResult result = ScanMatcher(config).match(predicted, Pose(), seen, map);
   EXPECT_TRUE(result.stats.applied());
   return result;
 }
 
+double height(const MatchResult& result) { return result.filter.nominal.T_odom_body.translation.y(); }
+
+/// What a standing sensor a metre above the patches makes of them.
+MatchResult match_over(const Patches& patches) {
+  std::vector<Eigen::Vector3f> mapped;
+  std::vector<Eigen::Vector3f> seen;
+  for_each_point_of_a_floor([&](float x, float z, int i, int k) {
+    const bool rough = (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(z))) % 2 != 0;
+    const bool high = (static_cast<int>(std::floor(x / 0.1F)) + static_cast<int>(std::floor(z / 0.1F))) % 2 != 0;
+    mapped.emplace_back(x, rough ? patches.too_high + (high ? -0.98F : -1.02F) : -1.0F, z);
+    seen.emplace_back(x, -1.0F + ((i + k) % 2 != 0 ? patches.noise : -patches.noise), z);
+  });
+  return match_at_rest(patches.smooth_plane_m, mapped, seen, 1e-4);
+}
+
 TEST(RoughPlanes, CountForLittleWhereThereAreSmoothOnes) {
-  const auto height = [](const MatchResult& result) { return result.filter.nominal.T_odom_body.translation.y(); };
   const double all_alike = height(match_over({.smooth_plane_m = 0.0}));
   EXPECT_GT(all_alike, 0.005);
   EXPECT_LT(std::abs(height(match_over({}))), 0.3 * all_alike);
@@ -153,26 +165,14 @@ TEST(RoughPlanes, DoNotMakeTheSmoothOnesPassForNoisy) {
 /// How much too high a standing sensor takes itself to be above strips of floor, each a voxel wide and every other one
 /// 4 cm higher, when it sees the lower ones alone: to each neighbourhood they are one rough plane halfway up.
 double height_over_strips(double smooth_plane_m) {
-  FrontendConfig config = test::tuned_config();
-  config.smooth_plane_m = smooth_plane_m;
   std::vector<Eigen::Vector3f> mapped;
   std::vector<Eigen::Vector3f> seen;
-  for (int i = -40; i < 40; ++i) {
-    for (int k = -40; k < 40; ++k) {
-      const auto x = 0.05F * (static_cast<float>(i) + 0.5F);
-      const auto z = 0.05F * (static_cast<float>(k) + 0.5F);
-      const bool low = static_cast<int>(std::floor(x / 0.2F)) % 2 == 0;
-      mapped.emplace_back(x, low ? -1.0F : -0.96F, z);
-      if (low) seen.push_back(mapped.back());
-    }
-  }
-  LocalMap map(config);
-  for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
-  FilterState predicted;
-  predicted.covariance = 1e-2 * ErrorCovariance::Identity();
-  const MatchResult result = ScanMatcher(config).match(predicted, Pose(), seen, map);
-  EXPECT_TRUE(result.stats.applied());
-  return result.filter.nominal.T_odom_body.translation.y();
+  for_each_point_of_a_floor([&](float x, float z, int, int) {
+    const bool low = static_cast<int>(std::floor(x / 0.2F)) % 2 == 0;
+    mapped.emplace_back(x, low ? -1.0F : -0.96F, z);
+    if (low) seen.push_back(mapped.back());
+  });
+  return height(match_at_rest(smooth_plane_m, mapped, seen, 1e-2));
 }
 
 TEST(RoughPlanes, LieWhereTheVoxelOfThePointSaysAndNotWhereItsNeighboursDo) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A spinning LiDAR where nothing tells how far along: rings that cross an edge must not pass for walls ahead."""
+"""A spinning LiDAR where little tells the way: its own rings must pass for no walls ahead, nor for a speed."""
 
 import json
 import os
