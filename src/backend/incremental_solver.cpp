@@ -271,6 +271,7 @@ double IncrementalSolver::half_chi_square() {
 double IncrementalSolver::half_chi_square(FactorId factor) { return impl_->error_of(factor); }
 
 std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint64_t key) const {
+  if (!impl_->broken.empty()) return std::nullopt;  // iSAM2 then lacks variables that its cliques name
   try {
     Eigen::MatrixXd covariance = impl_->isam.covariance(key);
     if (!covariance.allFinite()) return std::nullopt;

@@ -265,6 +265,7 @@ TEST(Fault_G4, ASolverThatCannotEvenBeRebuiltSaysSoAndKeepsItsLastSolution) {
     if (smoother.stats().solver_failure.empty()) continue;
     ++broken;
     EXPECT_TRUE(contains(smoother.stats().solver_failure, "cannot be rebuilt"));
+    EXPECT_FALSE(smoother.withdraw_loop(10, 0).covariance_valid) << "a command finds no covariance, and no crash";
   }
   EXPECT_GT(broken, 0);
 }
