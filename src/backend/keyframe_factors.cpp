@@ -18,6 +18,7 @@
 #include "backend/open_shifts.h"
 #include "backend/preintegration.h"
 #include "backend/relative_pose_factor.h"
+#include "backend/start_tilt_factor.h"
 
 namespace ignis {
 namespace {
@@ -31,9 +32,21 @@ using gtsam::symbol_shorthand::X;
 
 double square(double v) { return v * v; }
 
+constexpr double kUnknownTilt = 1.0;      // [rad] sigma
+constexpr double kLeastNoiseShare = 0.1;  // of the tilt: less would be a factor of next to no noise
+
+double prior_tilt(const BackendConfig& config) { return config.prior_tilt_deg * std::numbers::pi / 180.0; }
+
+/// [rad] What the first pose's tilt is off by beside the part that an unknown bias makes: the noise of the start.
+/// Nothing where the tilt is claimed to be known as well as that, so not by the accelerometer.
+std::optional<double> start_noise(const BackendConfig& config) {
+  const double variance = square(prior_tilt(config)) - square(config.prior_accel_bias / config.imu.gravity);
+  if (variance < square(kLeastNoiseShare * prior_tilt(config))) return std::nullopt;
+  return std::sqrt(variance);
+}
+
 /// Uncertainty about world axes (tilt about X and Z, heading about Y), told in body axes as GTSAM wants it.
-gtsam::Matrix6 first_pose_covariance(const Pose& T_map_body, const BackendConfig& config) {
-  const double tilt = config.prior_tilt_deg * std::numbers::pi / 180.0;
+gtsam::Matrix6 first_pose_covariance(const Pose& T_map_body, double tilt, const BackendConfig& config) {
   const gtsam::Vector3 about_world(square(tilt), square(config.prior_yaw_rad), square(tilt));
   const gtsam::Matrix3 R_body_map = T_map_body.rotation.conjugate().toRotationMatrix();
   gtsam::Matrix6 covariance = gtsam::Matrix6::Zero();
@@ -57,8 +70,14 @@ gtsam::SharedNoiseModel bias_noise(double accel_sigma, double gyro_sigma) {
 
 void add_first_factors(const KeyframeLink& link, const BackendConfig& config, gtsam::NonlinearFactorGraph& factors) {
   const NavState& state = link.guess;
+  const std::optional<double> noise = start_noise(config);
+  const double tilt = noise ? kUnknownTilt : prior_tilt(config);
   factors.addPrior(X(link.id), to_gtsam(state.T_odom_body),
-                   gtsam::noiseModel::Gaussian::Covariance(first_pose_covariance(state.T_odom_body, config)));
+                   gtsam::noiseModel::Gaussian::Covariance(first_pose_covariance(state.T_odom_body, tilt, config)));
+  if (noise) {
+    const double gravity = config.imu.gravity;
+    factors.push_back(make_start_tilt_factor(X(link.id), B(link.id), state, gravity, gravity * *noise));
+  }
   factors.addPrior(V(link.id), gtsam::Vector3(state.v_odom), Isotropic::Sigma(3, link.velocity_sigma));
   factors.addPrior(B(link.id), bias_of(state), bias_noise(config.prior_accel_bias, config.prior_gyro_bias));
 }

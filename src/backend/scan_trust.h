@@ -9,7 +9,7 @@ namespace ignis {
 /// along a direction that they hardly observe comes from planes whose errors are alike from scan to scan, so that an
 /// interval of many scans claims more there than it knows: in a corridor the graph's squared errors were five times
 /// what it announced. Attitude and position are each compared with their own best known direction: one that is known
-/// as well counts in full, one that is far worse known for half a percent.
+/// as well counts in full, one that is far worse known for a quarter of a percent.
 [[nodiscard]] Matrix6d trusted_information(const Matrix6d& scan_information);
 
 }  // namespace ignis

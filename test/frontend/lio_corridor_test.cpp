@@ -113,8 +113,11 @@ TEST(LioCorridor, WithoutAnEndTheAxisIsNamedAndItsSigmaGrows) {
 TEST(LioCorridor, TheEndIsOverlookedWithoutSalientPoints) {
   FrontendConfig config = test::tuned_config();
   config.salient_sigma = 0.0;
-  const Along along = along_corridor(config, drive_in(closed_corridor(), 1));
-  EXPECT_GT(along.share_named, 0.3) << "else the tests above would hold without them";
+  double share_named = 0.0;
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    share_named += 0.2 * along_corridor(config, drive_in(closed_corridor(), seed)).share_named;
+  }
+  EXPECT_GT(share_named, 0.3) << "else the tests above would hold without them";
 }
 
 test::PoseNees nees_in_bend(double radius_m, std::uint32_t seed) {
