@@ -314,10 +314,13 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (trust_.awaits_confirmation()) return;
   if (match.stats.applied()) {
     if (match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
+    // The covariance of a pose in a young map holds the map's noise, which must not be left behind in it once more; but
+    // more than half of it is the gyro's, which is (docs/front_end.md, The heading of a young map).
+    const double noise = std::sqrt(match.map_noise);
     const Eigen::Matrix3d turn = drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body,
-                                                 match.map_age_scans, blind_shifts(match.degeneracy));
-    turn_gravity(filter_.covariance, turn);
-    turn_gravity(cautious_, turn);
+                                                 match.map_age_scans / noise, blind_shifts(match.degeneracy));
+    turn_gravity(filter_.covariance, turn / noise);
+    turn_gravity(cautious_, turn / noise);
   }
   grow_map(cloud, match);
 }

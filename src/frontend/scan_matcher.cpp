@@ -89,9 +89,8 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
   const bool iterated = iterate(predicted, points_body, map, result);
   result.degeneracy = degeneracy_;
   result.facing = assessment.sensitivity.bottomRightCorner<3, 3>();
-  // The covariance of a pose in a young map holds the map's noise already, which must not be left behind in it once
-  // more; but more than half of it is the gyro's, which is. Measured: docs/front_end.md, The heading of a young map.
-  result.map_age_scans = (map.scans() + 1.0 - mean_map_scan_) * std::sqrt(map_noise_);
+  result.map_age_scans = (map.scans() + 1.0 - mean_map_scan_) * map_noise_;
+  result.map_noise = map_noise_;
   result.stats.reason = iterated ? judge(predicted, assessment, result) : ScanReason::kNumericalFailure;
   if (!result.stats.applied()) {
     result.filter = predicted;

@@ -35,8 +35,9 @@ struct MatchResult {
   ErrorCovariance considered = ErrorCovariance::Zero();
   DegeneracyAnalysis degeneracy;                     ///< which directions that leaves open
   Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();  ///< mean of n n^T over the planes, odom axes
-  /// Mean age of the map points that the scan met. Times the root of the factor by which the errors of a young map
-  /// widened the variance: all its scans share those, so that what one more of them adds is the part without.
+  double map_noise = 1.0;  ///< factor by which the errors of a young map widened the variance of what was matched
+  /// Mean age of the map points that the scan met. Times map_noise: all its scans share those errors, so that what one
+  /// more of them adds is the part without.
   double map_age_scans = 1.0;
 };
 
