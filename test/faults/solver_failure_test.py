@@ -18,6 +18,7 @@ PERIOD_US = 2_000_000
 LEAP_M = 740.0  # below the speed that is refused at once
 BELIEVED = 1e16  # information: a micrometre and less
 SESSIONS = 20
+SEED = 72  # of the seeds up to 100, 74 alone makes a graph that cannot be rebuilt
 # What makes the back end believe such odometry.
 TRUSTING = [
     word
@@ -39,7 +40,7 @@ def keyframe(session: int, number: int, position: list[float], information: floa
 
 def hopeless_drive(session: int) -> list[bytes]:
     """Leaps of hundreds of metres without IMU, each known to less than a micrometre."""
-    generator = random.Random(session)
+    generator = random.Random(SEED + session)
     position, messages = [0.0, 0.0, 0.0], []
     for number in range(KEYFRAMES):
         step = [generator.gauss(0.0, 1.0) for _ in range(3)]
