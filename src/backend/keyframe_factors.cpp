@@ -32,7 +32,7 @@ using gtsam::symbol_shorthand::X;
 
 double square(double v) { return v * v; }
 
-constexpr double kUnknownTilt = 1.0;      // [rad] sigma
+constexpr double kUnknownTilt = 1.0;      // [rad] sigma where the start's tilt factor tells it instead
 constexpr double kLeastNoiseShare = 0.1;  // of the tilt: less would be a factor of next to no noise
 
 double prior_tilt(const BackendConfig& config) { return config.prior_tilt_deg * std::numbers::pi / 180.0; }

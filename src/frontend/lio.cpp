@@ -314,8 +314,9 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (trust_.awaits_confirmation()) return;
   if (match.stats.applied()) {
     if (match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
-    // The covariance of a pose in a young map holds the map's noise, which must not be left behind in it once more; but
-    // more than half of it is the gyro's, which is (docs/front_end.md, The heading of a young map).
+    // The covariance of a pose in a young map holds the map's noise, which must not be left behind in it once more, and
+    // the gyro's, which is: the root lies between (docs/front_end.md, The heading of a young map). Gravity is doubted
+    // by the smaller of the two: with the larger one sixteen beams lost their way.
     const double noise = std::sqrt(match.map_noise);
     const Eigen::Matrix3d turn = drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body,
                                                  match.map_age_scans / noise, blind_shifts(match.degeneracy));

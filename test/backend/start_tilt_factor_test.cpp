@@ -8,6 +8,7 @@
 #include <gtsam/nonlinear/NonlinearFactor.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <numbers>
 #include <random>
 

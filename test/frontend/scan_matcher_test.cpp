@@ -115,8 +115,8 @@ struct Patches {
 /// Calls visit(x, z, i, k) for a grid of 5 cm over 4 m x 4 m.
 void for_each_point_of_a_floor(auto&& visit) {
   for (int i = -40; i < 40; ++i) {
-    for (int k = -40; k < 40; ++k)
-      visit(0.05F * (static_cast<float>(i) + 0.5F), 0.05F * (static_cast<float>(k) + 0.5F), i, k);
+    const float x = 0.05F * (static_cast<float>(i) + 0.5F);
+    for (int k = -40; k < 40; ++k) visit(x, 0.05F * (static_cast<float>(k) + 0.5F), i, k);
   }
 }
 
