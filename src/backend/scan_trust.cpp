@@ -9,8 +9,8 @@ namespace ignis {
 namespace {
 
 // Chosen for the NEES of the smoothed pose in corridor, open hall, hall and rooms (docs/back_end.md).
-constexpr double kWeak = 0.15;         // information relative to the best, of which about half counts
-constexpr double kWeakShare = 0.0025;  // of the weakest that counts
+constexpr double kWeak = 0.15;      // information relative to the best, of which about half counts
+constexpr double kWeakShare = 0.1;  // of the weakest that counts
 
 double best(const Eigen::Matrix3d& information) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()(2);

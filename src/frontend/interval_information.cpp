@@ -17,11 +17,7 @@ Matrix6d to_body(const NavState& state) {
   return turn;
 }
 
-/// Inverse of the covariance of a pose.
-Matrix6d pose_information(const ErrorCovariance& covariance) {
-  const Matrix6d pose = covariance.topLeftCorner<6, 6>();
-  return pose.ldlt().solve(Matrix6d::Identity());
-}
+Matrix6d inverse_of(const Matrix6d& pose_covariance) { return pose_covariance.ldlt().solve(Matrix6d::Identity()); }
 
 /// The nearest positive semidefinite matrix, in units in which `reference` is the identity.
 Matrix6d without_negative_part(const Matrix6d& difference, const Matrix6d& reference) {
@@ -41,6 +37,8 @@ void IntervalInformation::begin(const FilterState& filter) {
   with_scans_.topRows<6>().setZero();
   with_scans_.leftCols<6>().setZero();
   without_scans_ = with_scans_;
+  view_.begin_here();
+  map_shift_.setZero();
   sum_ = {};
   samples_ = 0;
   informed_ = false;
@@ -57,7 +55,8 @@ InertialInput IntervalInformation::mean_input() const {
   return {sum_.gyro / samples_, sum_.accel / samples_};
 }
 
-void IntervalInformation::add_scan(const NavState& state, const Matrix6d& information_body) {
+void IntervalInformation::add_scan(const NavState& state, const Matrix6d& information_body,
+                                   std::span<const Eigen::Vector3d> blind) {
   const double dt = seconds_between(state_.utime, state.utime);
   for (ErrorCovariance* covariance : {&with_scans_, &without_scans_}) {
     FilterState filter{state_, *covariance};
@@ -67,19 +66,30 @@ void IntervalInformation::add_scan(const NavState& state, const Matrix6d& inform
   state_ = state;
   sum_ = {};
   samples_ = 0;
-  if (information_body.isZero(0.0)) return;
+  if (!information_body.isZero(0.0)) take(information_body, blind);
+  view_.remember(position_in_map() + map_shift_, blind);
+}
+
+void IntervalInformation::take(const Matrix6d& information_body, std::span<const Eigen::Vector3d> blind) {
   PoseInformation scan;
-  scan.information = to_body(state).transpose() * information_body * to_body(state);
+  scan.information = to_body(state_).transpose() * information_body * to_body(state_);
   const UpdateStep update = information_update(with_scans_, ErrorVector::Zero(), scan);
   if (!update.ok) return;
+  const Eigen::Matrix3d before = position_in_map() + map_shift_;
   with_scans_ = update.covariance;
   informed_ = true;
+  widen_to(map_shift_, before, position_in_map(), blind);
+  view_.widen(map_shift_, blind, position_in_map());
 }
+
+Eigen::Matrix3d IntervalInformation::position_in_map() const { return with_scans_.block<3, 3>(kPosition, kPosition); }
 
 Matrix6d IntervalInformation::information() const {
   if (!informed_) return Matrix6d::Zero();
-  const Matrix6d known = pose_information(with_scans_);
-  const Matrix6d added = without_negative_part(known - pose_information(without_scans_), known);
+  Matrix6d with_scans = with_scans_.topLeftCorner<6, 6>();
+  with_scans.bottomRightCorner<3, 3>() += map_shift_;
+  const Matrix6d known = inverse_of(with_scans);
+  const Matrix6d added = without_negative_part(known - inverse_of(without_scans_.topLeftCorner<6, 6>()), known);
   const Matrix6d turn = to_body(state_);
   return turn * added * turn.transpose();
 }

@@ -41,13 +41,14 @@ void Keyframer::add_imu(const ImuSample& sample) {
 }
 
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
-                                            std::vector<CloudPoint> cloud, bool confirmed) {
+                                            std::span<const Eigen::Vector3d> blind, std::vector<CloudPoint> cloud,
+                                            bool confirmed) {
   const NavState& state = filter.nominal;
   recent_.push_back({state.utime, state.T_odom_body, std::move(cloud)});
   const Utime oldest = state.utime - to_micros(config_.keyframe_cloud_seconds);
   while (recent_.front().utime <= oldest) recent_.pop_front();
 
-  if (next_id_ > 0) information_.add_scan(state, information_body);
+  if (next_id_ > 0) information_.add_scan(state, information_body, blind);
   ++scans_;
   note_motion(state);
   if (!confirmed || !due(state)) return std::nullopt;

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/keyframe.h"
@@ -24,10 +25,12 @@ class Keyframer {
   /// The interval since the last keyframe has an IMU gap.
   void note_gap() { imu_complete_ = false; }
 
-  /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied. `cloud` is in
-  /// the body frame at that state. A keyframe that is due waits while the pose is not `confirmed`.
+  /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied; shifts along
+  /// the unit axes `blind` (odom) it does not observe. `cloud` is in the body frame at that state. A keyframe that is
+  /// due waits while the pose is not `confirmed`.
   std::optional<Keyframe> add_scan(const FilterState& filter, const Matrix6d& information_body,
-                                   std::vector<CloudPoint> cloud, bool confirmed = true);
+                                   std::span<const Eigen::Vector3d> blind, std::vector<CloudPoint> cloud,
+                                   bool confirmed = true);
 
  private:
   struct RegisteredScan {

@@ -240,8 +240,8 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   published.covariance.topLeftCorner<6, 6>() += drift_.pose_covariance(filter_.nominal.T_odom_body);
   auto position_covariance = published.covariance.block<3, 3>(kPosition, kPosition);
   position_covariance += tilt_of_blind_shifts(match.degeneracy, position_covariance);
-  drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation,
-                  blind_shifts(match.degeneracy));
+  const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
+  drift_.remember(map_.scans(), position_covariance, filter_.nominal.T_odom_body.translation, blind);
   result.covariance = published.covariance.topLeftCorner<15, 15>();
   if (match.stats.applied() && config_.deskew) {
     result.covariance.diagonal().segment<3>(kAttitude).array() +=
@@ -250,7 +250,7 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   result.trust = trust_.trust();
   if (velocity_known_) {
     result.keyframe =
-        keyframer_.add_scan(published, match.information_body, std::move(sparse), !trust_.awaits_confirmation());
+        keyframer_.add_scan(published, match.information_body, blind, std::move(sparse), !trust_.awaits_confirmation());
   }
   result.cloud = std::move(cloud);
   return result;

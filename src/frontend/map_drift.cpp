@@ -3,16 +3,12 @@
 
 #include <algorithm>
 #include <limits>
-#include <vector>
-
-#include <Eigen/Eigenvalues>
 
 #include "common/so3.h"
 
 namespace ignis {
 namespace {
 
-constexpr double kRegained = 1e-3;  // squared sine of an angle of two degrees between what was and what is not observed
 constexpr int kScansBetweenPlacements = 10;  // half a second
 constexpr std::size_t kMostPlacements = 150;
 
@@ -21,12 +17,6 @@ Matrix6d attitude_to_odom(const Pose& T_odom_body) {
   Matrix6d turn = Matrix6d::Identity();
   turn.topLeftCorner<3, 3>() = T_odom_body.rotation.toRotationMatrix();
   return turn;
-}
-
-Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes) {
-  Eigen::Matrix3d projector = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& axis : axes) projector += axis * axis.transpose();
-  return projector;
 }
 
 }  // namespace
@@ -56,8 +46,7 @@ Eigen::Matrix3d MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& 
 
 void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
                         std::span<const Eigen::Vector3d> blind) {
-  last_published_ = position_covariance;
-  last_blind_ = projector_on(blind);
+  view_.remember(position_covariance, blind);
   if (!placements_.empty() && scan < placements_.back().scan) placements_.clear();
   if (!placements_.empty() && scan < placements_.back().scan + kScansBetweenPlacements) return;
   placements_.push_back({scan, position_covariance, position_covariance - shift_by_tilt(position)});
@@ -96,31 +85,18 @@ void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const
   const Placement& then = behind == placements_.end() ? placements_.back() : *behind;
   covariance_ = at(T_odom_body.translation);
   position_ = T_odom_body.translation;
-  widen_to(then.position_covariance, Eigen::Matrix3d::Zero(), axes);
+  Eigen::Matrix3d shift = covariance_.bottomRightCorner<3, 3>();
+  widen_to(shift, then.position_covariance, Eigen::Matrix3d::Zero(), axes);
+  covariance_.bottomRightCorner<3, 3>() = shift;
 }
 
 void MapDrift::hand_over(std::span<const Eigen::Vector3d> blind, const Pose& T_odom_body,
                          const Eigen::Matrix3d& in_map) {
-  if (last_blind_.isZero()) return;
-  const Eigen::Matrix3d seen = Eigen::Matrix3d::Identity() - projector_on(blind);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> regained(seen * last_blind_ * seen);
-  std::vector<Eigen::Vector3d> axes;
-  for (int k = 0; k < 3; ++k) {
-    if (regained.eigenvalues()[k] > kRegained) axes.emplace_back(regained.eigenvectors().col(k));
-  }
   covariance_ = at(T_odom_body.translation);
   position_ = T_odom_body.translation;
-  widen_to(last_published_, in_map, axes);
-}
-
-/// So that the map's shift and `in_map` make up at least `position_covariance` along each of the axes.
-void MapDrift::widen_to(const Eigen::Matrix3d& position_covariance, const Eigen::Matrix3d& in_map,
-                        std::span<const Eigen::Vector3d> axes) {
-  auto shift = covariance_.bottomRightCorner<3, 3>();
-  for (const Eigen::Vector3d& axis : axes) {
-    const double missing = axis.dot((position_covariance - in_map - shift) * axis);
-    if (missing > 0.0) shift += missing * axis * axis.transpose();
-  }
+  Eigen::Matrix3d shift = covariance_.bottomRightCorner<3, 3>();
+  view_.widen(shift, blind, in_map);
+  covariance_.bottomRightCorner<3, 3>() = shift;
 }
 
 Eigen::Matrix3d MapDrift::shift_since_start(const Eigen::Vector3d& position) const {

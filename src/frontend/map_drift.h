@@ -6,6 +6,7 @@
 
 #include "common/pose.h"
 #include "frontend/eskf.h"
+#include "frontend/regained_view.h"
 
 namespace ignis {
 
@@ -83,8 +84,6 @@ class MapDrift {
   };
 
   void forget_one();
-  void widen_to(const Eigen::Matrix3d& position_covariance, const Eigen::Matrix3d& in_map,
-                std::span<const Eigen::Vector3d> axes);
   [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
   [[nodiscard]] Eigen::Matrix3d shift_by_tilt(const Eigen::Vector3d& position) const;
 
@@ -93,8 +92,7 @@ class MapDrift {
   Eigen::Vector3d position_ = Eigen::Vector3d::Zero();    ///< where covariance_ is meant
   Eigen::Matrix3d start_tilt_ = Eigen::Matrix3d::Zero();  ///< of the frame against the level one [rad^2]
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d last_published_ = Eigen::Matrix3d::Zero();  ///< of the position, at the last scan
-  Eigen::Matrix3d last_blind_ = Eigen::Matrix3d::Zero();      ///< projects on the shifts that it did not observe
+  RegainedView view_;                 ///< since the last scan, with the published position
   std::deque<Placement> placements_;  ///< every tenth scan at first, the older the fewer; oldest first
 
   friend void transfer(auto& io, FieldsOf<MapDrift> auto& drift) {
@@ -102,8 +100,7 @@ class MapDrift {
     io.matrix(drift.position_);
     io.matrix(drift.start_tilt_);
     io.matrix(drift.start_);
-    io.matrix(drift.last_published_);
-    io.matrix(drift.last_blind_);
+    transfer(io, drift.view_);
     io.list(drift.placements_);
   }
 };

@@ -52,15 +52,15 @@ NavState carried(const NavState& from, ImuSum sum) {
 }
 
 TEST(OpenShifts, IsTheAxisOfABareCorridorAndNothingElse) {
-  EXPECT_LT((open_shifts(corridor(1e-6)) - Eigen::Matrix3d(Eigen::Vector3d(0, 0, 1).asDiagonal())).norm(), 1e-3);
-  EXPECT_NEAR(open_shifts(corridor(0.003))(2, 2), 0.5, 1e-3);
-  EXPECT_LT(open_shifts(corridor(0.1)).norm(), 2e-3);
+  EXPECT_LT((open_shifts(corridor(1e-8)) - Eigen::Matrix3d(Eigen::Vector3d(0, 0, 1).asDiagonal())).norm(), 1e-3);
+  EXPECT_NEAR(open_shifts(corridor(1e-5))(2, 2), 0.5, 1e-3);
+  EXPECT_LT(open_shifts(corridor(1e-3)).norm(), 2e-3);
 }
 
 TEST(OpenShifts, TurnsWithTheAxes) {
   const Eigen::Matrix3d R = so3::exp({0.3, -0.8, 0.5}).toRotationMatrix();
-  const Eigen::Matrix3d turned = R * open_shifts(corridor(0.002)) * R.transpose();
-  EXPECT_LT((open_shifts(R * corridor(0.002) * R.transpose()) - turned).norm(), 1e-9);
+  const Eigen::Matrix3d turned = R * open_shifts(corridor(2e-5)) * R.transpose();
+  EXPECT_LT((open_shifts(R * corridor(2e-5) * R.transpose()) - turned).norm(), 1e-9);
 }
 
 TEST(OpenShifts, IsNothingWhereScansSayNothingAtAll) {

@@ -26,7 +26,7 @@ class Stepper {
     filter.nominal.utime = now;
     filter.nominal.T_odom_body = {frames::from_yaw_pitch_roll({yaw, 0.0, 0.0}), position};
     filter.nominal.v_odom = {0.0, 0.0, -speed};
-    return keyframer.add_scan(filter, Matrix6d::Identity(), cloud, confirmed);
+    return keyframer.add_scan(filter, Matrix6d::Identity(), {}, cloud, confirmed);
   }
 
   Keyframer keyframer;
@@ -126,7 +126,7 @@ TEST(Keyframer, InformationIsThatOfItsIntervalAlone) {
   FilterState filter;
   filter.nominal.utime = stepper.now + 50'000;
   filter.nominal.T_odom_body.translation = {0.0, 0.0, -10.0};
-  const auto uninformed = stepper.keyframer.add_scan(filter, Matrix6d::Zero(), {});
+  const auto uninformed = stepper.keyframer.add_scan(filter, Matrix6d::Zero(), {}, {});
   ASSERT_TRUE(uninformed.has_value());
   EXPECT_EQ(uninformed->scan_information.norm(), 0.0);
 }
