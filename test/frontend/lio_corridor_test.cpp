@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "frontend/lio_runner.h"
@@ -118,6 +119,23 @@ TEST(LioCorridor, TheEndIsOverlookedWithoutSalientPoints) {
     share_named += 0.2 * along_corridor(config, drive_in(closed_corridor(), seed)).share_named;
   }
   EXPECT_GT(share_named, 0.3) << "else the tests above would hold without them";
+}
+
+/// [m] what the scans tell of the way along the corridor to the first keyframe behind the start.
+double told_sigma_along(const Drive& drive) {
+  const LioRun run = test::run_lio(test::tuned_config(), drive);
+  const auto first = std::ranges::find_if(run.scans, [](const ScanResult& scan) {
+    return scan.keyframe && scan.keyframe->previous_utime < scan.keyframe->state.utime;
+  });
+  const Matrix6d little = 1e-6 * Matrix6d::Identity();
+  return std::sqrt((first->keyframe->scan_information + little).inverse()(5, 5));
+}
+
+TEST(LioCorridor, AKeyframeSaysLittleOfAWayWhoseEndCameIntoSightOnIt) {
+  for (const double end_m : {15.0, 16.0}) {
+    EXPECT_GT(told_sigma_along(drive_in(closed_corridor(end_m), 3)), 0.2) << end_m << " m";
+  }
+  EXPECT_LT(told_sigma_along(drive_in(closed_corridor(), 3)), 0.1) << "in sight all the time";
 }
 
 test::PoseNees nees_in_bend(double radius_m, std::uint32_t seed) {
