@@ -9,7 +9,7 @@ import pytest
 
 from ignis.errors import InputError
 from ignis.evaluate import Row, Variant, table
-from ignis.evaluation.consistency import band, nees_of, silent_percent
+from ignis.evaluation.consistency import band, inside_percent, nees_of, silent_percent
 from ignis.evaluation.drives import Simulation, changed_scene
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, write_tum
 
@@ -61,6 +61,12 @@ def test_nees_is_the_square_of_how_much_larger_the_errors_are(tmp_path: Path) ->
     assert attitude == pytest.approx(9.0, rel=0.25)
 
 
+def test_few_poses_lie_outside_three_sigma_of_an_honest_covariance(tmp_path: Path) -> None:
+    """In one of six coordinates: 1.6 %. With errors three times as large each coordinate is inside with 68 %."""
+    assert inside_percent(tmp_path / "a", _replay(tmp_path / "a", 1, 1.0)) > 97.0
+    assert 5.0 < inside_percent(tmp_path / "b", _replay(tmp_path / "b", 1, 3.0)) < 40.0
+
+
 def test_a_pose_that_is_off_and_said_to_be_ok_is_silent(tmp_path: Path) -> None:
     """Ten scans a metre off: five are reported as OK, three as degraded, two as lost; the ninety others are right."""
     utime = np.arange(100) * 50_000 + 1_000_000
@@ -106,6 +112,7 @@ def test_table_lists_drives_in_order_and_means_over_seeds() -> None:
                 "ate_m",
                 "smoothed_ate_m",
                 "drift_percent",
+                "inside_percent",
                 "silent_percent",
                 "applied_percent",
                 "named_percent",

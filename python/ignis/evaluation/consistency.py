@@ -14,6 +14,7 @@ from ignis.poses import Poses, Trajectory, quaternion_from_matrix, read_tum, rot
 from ignis.trajectory_error import aligned_at_start, paired, position_errors
 
 BAND = 0.95
+SIGMAS = 3.0
 SILENT_M = 0.5  # a pose that is farther off and reported as OK
 _OK = 0
 
@@ -56,8 +57,22 @@ def nees_of(folder: Path, truth: Trajectory) -> tuple[float, float]:
 
 def nees(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory) -> tuple[float, float]:
     """Of position and attitude, per degree of freedom; covariances (n, 6, 6), attitude in body axes, then position in
-    those of the trajectory. The frame of reference is level and has its origin and heading at the first pose, so the
-    tilt of the start is an error."""
+    those of the trajectory."""
+    errors, covariance = _pose_errors(estimate, covariance, truth)
+    return _mean_square(errors[:, 3:], covariance[:, 3:, 3:]), _mean_square(errors[:, :3], covariance[:, :3, :3])
+
+
+def inside_percent(folder: Path, truth: Trajectory) -> float:
+    """[%] Scans of a replay's folder whose pose is off by less than SIGMAS sigma in each of its six coordinates."""
+    covariance = read_pose_covariances(folder / "eskf_states.csv")
+    errors, covariance = _pose_errors(read_tum(folder / "eskf.tum"), covariance, truth)
+    sigmas = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    return float(100.0 * np.mean(np.all(np.abs(errors) < SIGMAS * sigmas, axis=1)))
+
+
+def _pose_errors(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 6), attitude in body axes, then position, where there is truth, and the covariances there. The frame of
+    reference is level and has its origin and heading at the first pose, so the tilt of the start is an error."""
     pair = paired(estimate, truth)
     covariance = covariance[np.isin(estimate.utime, pair.estimate.utime)]
     true = _level_start(pair.truth.poses[:1]).inverse()[np.zeros(len(covariance), dtype=int)] @ pair.truth.poses
@@ -69,7 +84,7 @@ def nees(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory) -> tup
         [R_error[:, 2, 1] - R_error[:, 1, 2], R_error[:, 0, 2] - R_error[:, 2, 0], R_error[:, 1, 0] - R_error[:, 0, 1]],
         axis=1,
     )
-    return _mean_square(shift, covariance[:, 3:, 3:]), _mean_square(turn, covariance[:, :3, :3])
+    return np.hstack([turn, shift]), covariance
 
 
 def _level_start(first: Poses) -> Poses:
