@@ -137,8 +137,11 @@ Drive make_drive(const DriveOptions& o) {
       noise << gaussian(random, o.odometry_sigma_rad), gaussian(random, o.odometry_sigma_m);
       const Pose T_previous_this =
           drive.T_world_body[static_cast<std::size_t>(i) - 1].inverse() * drive.T_world_body.back();
-      T_odom_body = T_odom_body * perturbed_in_body(T_previous_this, noise);
-      follow_step(covariance, T_previous_this, T_odom_body, o);
+      // As a front end does: along the way that it believes in. Along the true one the covariance would seem to grow by
+      // more than the steps' noise, and the chain of odometry would doubt itself the more the longer the drive.
+      const Pose believed = perturbed_in_body(T_previous_this, noise);
+      T_odom_body = T_odom_body * believed;
+      follow_step(covariance, believed, T_odom_body, o);
       keyframe.previous_utime = drive.keyframes.back().state.utime;
       keyframe.imu = imu_between(gyro, accel, keyframe.previous_utime, keyframe.state.utime, o, random);
       keyframe.scan_information = information(o);
