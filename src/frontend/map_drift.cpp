@@ -37,10 +37,9 @@ Eigen::Matrix3d MapDrift::add_scan(const Matrix6d& pose_covariance, const Pose& 
                                    std::span<const Eigen::Vector3d> blind) {
   Matrix6d measured = attitude_to_odom(T_odom_body);
   measured.bottomRightCorner<3, 3>() -= projector_on(blind);
-  covariance_ = at(T_odom_body.translation);
+  carry_to(T_odom_body.translation);
   const Matrix6d added = scale_ / std::max(age_scans, 1.0) * measured * pose_covariance * measured.transpose();
   covariance_ += added;
-  position_ = T_odom_body.translation;
   return added.topLeftCorner<3, 3>();
 }
 
@@ -83,20 +82,14 @@ void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const
   // The first one behind that scan: uncertainty grows on the way, so this errs towards too much.
   const auto behind = std::ranges::lower_bound(placements_, scan, {}, &Placement::scan);
   const Placement& then = behind == placements_.end() ? placements_.back() : *behind;
-  covariance_ = at(T_odom_body.translation);
-  position_ = T_odom_body.translation;
-  Eigen::Matrix3d shift = covariance_.bottomRightCorner<3, 3>();
-  widen_to(shift, then.position_covariance, Eigen::Matrix3d::Zero(), axes);
-  covariance_.bottomRightCorner<3, 3>() = shift;
+  carry_to(T_odom_body.translation);
+  widen_to(covariance_.bottomRightCorner<3, 3>(), then.position_covariance, Eigen::Matrix3d::Zero(), axes);
 }
 
 void MapDrift::hand_over(std::span<const Eigen::Vector3d> blind, const Pose& T_odom_body,
                          const Eigen::Matrix3d& in_map) {
-  covariance_ = at(T_odom_body.translation);
-  position_ = T_odom_body.translation;
-  Eigen::Matrix3d shift = covariance_.bottomRightCorner<3, 3>();
-  view_.widen(shift, blind, in_map);
-  covariance_.bottomRightCorner<3, 3>() = shift;
+  carry_to(T_odom_body.translation);
+  view_.widen(covariance_.bottomRightCorner<3, 3>(), blind, in_map);
 }
 
 Eigen::Matrix3d MapDrift::shift_since_start(const Eigen::Vector3d& position) const {
@@ -106,6 +99,11 @@ Eigen::Matrix3d MapDrift::shift_since_start(const Eigen::Vector3d& position) con
 Matrix6d MapDrift::pose_covariance(const Pose& T_odom_body) const {
   const Matrix6d turn = attitude_to_odom(T_odom_body);
   return turn.transpose() * at(T_odom_body.translation) * turn;
+}
+
+void MapDrift::carry_to(const Eigen::Vector3d& position) {
+  covariance_ = at(position);
+  position_ = position;
 }
 
 Matrix6d MapDrift::at(const Eigen::Vector3d& position) const {

@@ -84,6 +84,7 @@ class MapDrift {
   };
 
   void forget_one();
+  void carry_to(const Eigen::Vector3d& position);
   [[nodiscard]] Matrix6d at(const Eigen::Vector3d& position) const;
   [[nodiscard]] Eigen::Matrix3d shift_by_tilt(const Eigen::Vector3d& position) const;
 

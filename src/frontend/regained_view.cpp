@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/regained_view.h"
 
+#include <vector>
+
 #include <Eigen/Eigenvalues>
 
 namespace ignis {
@@ -15,7 +17,7 @@ void RegainedView::remember(const Eigen::Matrix3d& position_covariance, std::spa
   blind_ = projector_on(blind);
 }
 
-void RegainedView::widen(Eigen::Matrix3d& shift, std::span<const Eigen::Vector3d> blind,
+void RegainedView::widen(Eigen::Ref<Eigen::Matrix3d> shift, std::span<const Eigen::Vector3d> blind,
                          const Eigen::Matrix3d& in_map) const {
   if (blind_.isZero()) return;
   const Eigen::Matrix3d seen = Eigen::Matrix3d::Identity() - projector_on(blind);
@@ -33,8 +35,8 @@ Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes) {
   return projector;
 }
 
-void widen_to(Eigen::Matrix3d& shift, const Eigen::Matrix3d& position_covariance, const Eigen::Matrix3d& in_map,
-              std::span<const Eigen::Vector3d> axes) {
+void widen_to(Eigen::Ref<Eigen::Matrix3d> shift, const Eigen::Matrix3d& position_covariance,
+              const Eigen::Matrix3d& in_map, std::span<const Eigen::Vector3d> axes) {
   for (const Eigen::Vector3d& axis : axes) {
     const double missing = axis.dot((position_covariance - in_map - shift) * axis);
     if (missing > 0.0) shift += missing * axis * axis.transpose();

@@ -115,9 +115,10 @@ TEST(IntervalInformation, WhatCameIntoViewAtTheEndSaysNothingOfTheInterval) {
   EXPECT_GT(driver.sigma_along(), 0.5);
 }
 
-TEST(IntervalInformation, ABlindnessFromBeforeTheBeginningLastsIntoTheInterval) {
+TEST(IntervalInformation, WhatWasLostBeforeItBeganDoesNotCount) {
   Driver driver;
   driver.drive_blindly(60, 0.0);
+  driver.drive(1, 0.002);
   driver.interval.begin(driver.filter);
   driver.drive_blindly(20, 0.0);
   driver.interval.begin(driver.filter);

@@ -14,7 +14,7 @@ from ignis.poses import Poses, Trajectory, quaternion_from_matrix, read_tum, rot
 from ignis.trajectory_error import aligned_at_start, paired, position_errors
 
 BAND = 0.95
-SIGMAS = 3.0
+SIGMAS = 3.0  # within which an honest pose nearly always lies, in each coordinate
 SILENT_M = 0.5  # a pose that is farther off and reported as OK
 _OK = 0
 
