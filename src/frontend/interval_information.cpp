@@ -78,8 +78,8 @@ void IntervalInformation::take(const Matrix6d& information_body, std::span<const
   const Eigen::Matrix3d before = position_in_map() + map_shift_;
   with_scans_ = update.covariance;
   informed_ = true;
-  widen_to(map_shift_, before, position_in_map(), blind);
-  view_.widen(map_shift_, blind, position_in_map());
+  map_shift_ = widened_to(before, map_shift_, position_in_map(), blind);
+  map_shift_ = view_.widened(map_shift_, blind, position_in_map());
 }
 
 Eigen::Matrix3d IntervalInformation::position_in_map() const { return with_scans_.block<3, 3>(kPosition, kPosition); }

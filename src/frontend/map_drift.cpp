@@ -83,13 +83,15 @@ void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const
   const auto behind = std::ranges::lower_bound(placements_, scan, {}, &Placement::scan);
   const Placement& then = behind == placements_.end() ? placements_.back() : *behind;
   carry_to(T_odom_body.translation);
-  widen_to(covariance_.bottomRightCorner<3, 3>(), then.position_covariance, Eigen::Matrix3d::Zero(), axes);
+  auto shift = covariance_.bottomRightCorner<3, 3>();
+  shift = widened_to(then.position_covariance, shift, Eigen::Matrix3d::Zero(), axes);
 }
 
 void MapDrift::hand_over(std::span<const Eigen::Vector3d> blind, const Pose& T_odom_body,
                          const Eigen::Matrix3d& in_map) {
   carry_to(T_odom_body.translation);
-  view_.widen(covariance_.bottomRightCorner<3, 3>(), blind, in_map);
+  auto shift = covariance_.bottomRightCorner<3, 3>();
+  shift = view_.widened(shift, blind, in_map);
 }
 
 Eigen::Matrix3d MapDrift::shift_since_start(const Eigen::Vector3d& position) const {

@@ -17,16 +17,16 @@ void RegainedView::remember(const Eigen::Matrix3d& position_covariance, std::spa
   blind_ = projector_on(blind);
 }
 
-void RegainedView::widen(Eigen::Ref<Eigen::Matrix3d> shift, std::span<const Eigen::Vector3d> blind,
-                         const Eigen::Matrix3d& in_map) const {
-  if (blind_.isZero()) return;
+Eigen::Matrix3d RegainedView::widened(const Eigen::Matrix3d& shift, std::span<const Eigen::Vector3d> blind,
+                                      const Eigen::Matrix3d& in_map) const {
+  if (blind_.isZero()) return shift;
   const Eigen::Matrix3d seen = Eigen::Matrix3d::Identity() - projector_on(blind);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> regained(seen * blind_ * seen);
   std::vector<Eigen::Vector3d> axes;
   for (int k = 0; k < 3; ++k) {
     if (regained.eigenvalues()[k] > kRegained) axes.emplace_back(regained.eigenvectors().col(k));
   }
-  widen_to(shift, position_covariance_, in_map, axes);
+  return widened_to(position_covariance_, shift, in_map, axes);
 }
 
 Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes) {
@@ -35,12 +35,13 @@ Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes) {
   return projector;
 }
 
-void widen_to(Eigen::Ref<Eigen::Matrix3d> shift, const Eigen::Matrix3d& position_covariance,
-              const Eigen::Matrix3d& in_map, std::span<const Eigen::Vector3d> axes) {
+Eigen::Matrix3d widened_to(const Eigen::Matrix3d& position_covariance, Eigen::Matrix3d shift,
+                           const Eigen::Matrix3d& in_map, std::span<const Eigen::Vector3d> axes) {
   for (const Eigen::Vector3d& axis : axes) {
     const double missing = axis.dot((position_covariance - in_map - shift) * axis);
     if (missing > 0.0) shift += missing * axis * axis.transpose();
   }
+  return shift;
 }
 
 }  // namespace ignis

@@ -20,10 +20,10 @@ class RegainedView {
   void remember(const Eigen::Matrix3d& position_covariance, std::span<const Eigen::Vector3d> blind);
 
   /// At the next scan, which does not observe `blind` and leaves the position known with `in_map` against what it was
-  /// matched with: widens `shift`, the covariance of that, until both make up what was remembered along each axis that
+  /// matched with: `shift`, the covariance of that, so wide that both make up what was remembered along each axis that
   /// has come into view. All [m^2, odom axes].
-  void widen(Eigen::Ref<Eigen::Matrix3d> shift, std::span<const Eigen::Vector3d> blind,
-             const Eigen::Matrix3d& in_map) const;
+  [[nodiscard]] Eigen::Matrix3d widened(const Eigen::Matrix3d& shift, std::span<const Eigen::Vector3d> blind,
+                                        const Eigen::Matrix3d& in_map) const;
 
   /// From here on the position is told against this one; what was blind still is.
   void begin_here() { position_covariance_.setZero(); }
@@ -41,9 +41,9 @@ class RegainedView {
 /// Onto the space that orthonormal `axes` span.
 [[nodiscard]] Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes);
 
-/// Widens `shift` so that it and `in_map` make up at least `position_covariance` along each of the unit axes. All [m^2,
+/// `shift` so wide that it and `in_map` make up at least `position_covariance` along each of the unit axes. All [m^2,
 /// odom axes].
-void widen_to(Eigen::Ref<Eigen::Matrix3d> shift, const Eigen::Matrix3d& position_covariance,
-              const Eigen::Matrix3d& in_map, std::span<const Eigen::Vector3d> axes);
+[[nodiscard]] Eigen::Matrix3d widened_to(const Eigen::Matrix3d& position_covariance, Eigen::Matrix3d shift,
+                                         const Eigen::Matrix3d& in_map, std::span<const Eigen::Vector3d> axes);
 
 }  // namespace ignis
