@@ -95,9 +95,9 @@ void blind_shifts_of_point(const DegeneracyAnalysis& analysis, const Eigen::Matr
 [[nodiscard]] DegeneracyAnalysis without_known_shifts(DegeneracyAnalysis analysis, const Eigen::Matrix3d& information,
                                                       double sigma_m);
 
-/// What a blind shift adds to the covariance of the other shifts [m^2]. The direction itself is known to a degree or so
-/// only, and a vehicle that is off by metres along a corridor is off by centimetres across it, in a map that has the
-/// same error. `position_covariance` in odom axes.
+/// What a blind shift adds to the covariance of the other shifts [m^2]. The direction itself is known to a few
+/// milliradians only, and a vehicle that is off by metres along a corridor is off by centimetres across it, in a map
+/// that has the same error. `position_covariance` in odom axes.
 [[nodiscard]] Eigen::Matrix3d tilt_of_blind_shifts(const DegeneracyAnalysis& analysis,
                                                    const Eigen::Matrix3d& position_covariance);
 

@@ -44,10 +44,14 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
 
 bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view) {
   constexpr double kFlat = 0.1;  // rad
-  const double now = plane.normal.dot(view);
+  constexpr double kSure = 2.0;  // sigma of the normal
+  // From the plane and not from the query point, which the thickness of a wall sets apart from it.
+  const Eigen::Vector3d from_plane = view - plane.offset;
+  const double now = plane.normal.dot(from_plane);
   const double then = plane.normal.dot(plane.view);
   if ((now > 0.0) == (then > 0.0)) return false;
-  return std::abs(then) > kFlat && now * now > kFlat * kFlat * view.squaredNorm();
+  const double now_variance = (plane.normal_sigma.transpose() * from_plane).squaredNorm();
+  return std::abs(then) > kFlat && now * now > kSure * kSure * now_variance;
 }
 
 }  // namespace ignis

@@ -64,9 +64,10 @@ struct PlaneFit {
   return fit_plane(moments, config, config.match_radius_m);
 }
 
-/// True when the neighbours were seen from one side of their plane and `view`, a vector of any length to the body, is
-/// on the other: they are the far face of a wall. Seen at a flat angle, errors of the normal decide, so that says
-/// nothing.
+/// True when the neighbours were seen from one side of their plane and the body is on the other: they are the far face
+/// of a wall. `view`: vector from the query point to the body [m]. Where the normal's own error decides on which side
+/// the body is, that says nothing; an angle is no measure of it: within a doorway the wall beside it is seen at a few
+/// degrees, and its plane is known better.
 [[nodiscard]] bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view);
 
 }  // namespace ignis

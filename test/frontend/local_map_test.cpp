@@ -136,7 +136,11 @@ TEST(LocalMap, GathersWhatWasSeenFromOneSideOfAPlane) {
   EXPECT_NEAR(back.sum.x() / back.weight, 0.10, 1e-6);
   EXPECT_TRUE(is_seen_from_other_side(fit_plane(front, config, 0.4), normal));
   EXPECT_FALSE(is_seen_from_other_side(fit_plane(front, config, 0.4), -normal));
-  EXPECT_FALSE(is_seen_from_other_side(fit_plane(front, config, 0.4), {0.5, 9.99, 0.0})) << "too flat to say";
+  PlaneFit wall = fit_plane(front, config, 0.4);
+  const Eigen::Vector3d at_three_degrees(0.5, 9.99, 0.0);
+  EXPECT_TRUE(is_seen_from_other_side(wall, at_three_degrees)) << "its normal is known";
+  wall.normal_sigma.col(0) = 0.03 * Eigen::Vector3d::UnitY();
+  EXPECT_FALSE(is_seen_from_other_side(wall, at_three_degrees)) << "its normal may be off by as much";
 }
 
 /// Whatever the place of a plane in the grid, its noisy points are fitted where it is.
