@@ -36,8 +36,8 @@ TEST(ScanTrust, CountsWhatScansHardlyObserveForLittle) {
   const auto share_along = [](double sigma) {
     return trusted_information(corridor(sigma))(5, 5) / corridor(sigma)(5, 5);
   };
-  EXPECT_NEAR(share_along(0.2), 0.113, 0.001);
-  EXPECT_NEAR(share_along(1e-3 / std::sqrt(0.15)), 0.623, 0.01);
+  EXPECT_NEAR(share_along(0.2), 0.126, 0.001);
+  EXPECT_NEAR(share_along(1e-3 / std::sqrt(0.3)), 0.694, 0.01);
   EXPECT_NEAR(share_along(0.0011), 1.0, 0.05);
   EXPECT_NEAR(trusted_information(corridor(0.2))(4, 4) / corridor(0.2)(4, 4), 1.0, 1e-9);
 }
@@ -45,7 +45,7 @@ TEST(ScanTrust, CountsWhatScansHardlyObserveForLittle) {
 TEST(ScanTrust, ComparesAttitudeWithAttitude) {
   Matrix6d yard = information_of(2e-4, 1e-3);
   yard(1, 1) = 1.0 / (0.05 * 0.05);
-  EXPECT_NEAR(trusted_information(yard)(1, 1) / yard(1, 1), 0.113, 0.001);
+  EXPECT_NEAR(trusted_information(yard)(1, 1) / yard(1, 1), 0.126, 0.001);
   EXPECT_NEAR(trusted_information(yard)(0, 0) / yard(0, 0), 1.0, 1e-9);
   EXPECT_NEAR(trusted_information(yard)(3, 3) / yard(3, 3), 1.0, 1e-9);
 }
