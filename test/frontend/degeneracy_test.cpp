@@ -176,5 +176,16 @@ TEST(Degeneracy, NamesTheTurnThatGoesWithAShift) {
             "position along odom (0.00, 0.00, 1.00), turning 0.125 rad/m about body (0.00, 1.00, 0.00)");
 }
 
+/// Sixty drives of a bare corridor: 27 m off along it, 0.08 m across, heading included.
+TEST(Degeneracy, AShiftThatNothingHoldsMakesThreeMillimetresAMetreAcrossIt) {
+  DegeneracyAnalysis analysis;
+  analysis.degenerate = {Vector6d::Unit(5)};
+  const Eigen::Vector3d sigmas(0.02, 0.03, 27.0);
+  const Eigen::Matrix3d tilt = tilt_of_blind_shifts(analysis, sigmas.cwiseAbs2().asDiagonal());
+  EXPECT_NEAR(std::sqrt(tilt(0, 0)), 0.08, 0.01);
+  EXPECT_NEAR(std::sqrt(tilt(1, 1)), 0.08, 0.01);
+  EXPECT_EQ(tilt(2, 2), 0.0);
+}
+
 }  // namespace
 }  // namespace ignis
