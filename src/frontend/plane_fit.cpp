@@ -43,7 +43,7 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
 }
 
 bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view) {
-  constexpr double kFlat = 0.1;  // rad
+  constexpr double kFlat = 0.1;  // rad, angle to the plane at which it was seen on average
   constexpr double kSure = 2.0;  // sigma of the normal
   // From the plane and not from the query point, which the thickness of a wall sets apart from it.
   const Eigen::Vector3d from_plane = view - plane.offset;
