@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shared by all Python tests: where the checkout, the build and the recordings are, and a network of our own."""
 
+import gc
 import os
 import signal
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,13 @@ def private_network() -> None:
     from ignis.pipeline import enter_private_network
 
     enter_private_network()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_listener_left() -> Iterator[None]:
+    """A bus that a file opened reads on in a thread of its own until Python collects it."""
+    yield
+    gc.collect()
 
 
 @pytest.fixture

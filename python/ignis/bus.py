@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
+import weakref
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -28,10 +29,27 @@ def default_url() -> str:
     return os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL
 
 
-def open_bus(url: str) -> lcm.LCM:
+class Bus(lcm.LCM):
+    """An lcm.LCM that ends with its owner, also when a handler is a method of the owner.
+
+    Python's garbage collector does not see what lcm.LCM holds. A handler that leads back to the bus would keep both
+    for ever, with a thread that takes every later message of the network. So only the list here holds the handlers.
+    """
+
+    def __init__(self, url: str) -> None:
+        super().__init__(url)
+        self._handlers: list[Callable[[str, bytes], None]] = []
+
+    def subscribe(self, channel: str, handler: Callable[[str, bytes], None]) -> Any:
+        """As lcm.LCM does; the bus keeps the handler for as long as it lives itself."""
+        self._handlers.append(handler)
+        return super().subscribe(channel, weakref.proxy(handler))
+
+
+def open_bus(url: str) -> Bus:
     """The bus; an InputError that says what to do when it cannot be opened."""
     try:
-        return lcm.LCM(url)
+        return Bus(url)
     except (RuntimeError, OSError) as error:
         raise InputError(
             f"cannot open the message bus {url}: {error}. If multicast has no route, run: "

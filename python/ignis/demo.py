@@ -19,9 +19,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import lcm
-
 from ignis import results
+from ignis.bus import open_bus
 from ignis.compare import comparison, table
 from ignis.errors import EXIT_FAILURE, InputError, run_command
 from ignis.files import write_text
@@ -161,7 +160,7 @@ class _News:
     def __init__(self, url: str) -> None:
         from ignis_lcm.ignis import health_t, loop_result_t, scan_stats_t
 
-        self.bus = lcm.LCM(url)
+        self.bus = open_bus(url)
         self.applied = self.scans = self.loops = 0
         self.states: dict[str, str] = {}
         self.types = {"LIO_SCAN_STATS": scan_stats_t, "LOOP_RESULT": loop_result_t, "HEALTH": health_t}

@@ -8,10 +8,11 @@ import os
 import sys
 import time
 
-import lcm
 from ignis_lcm.ignis import graph_command_t, loop_result_t, smoothed_keyframes_t
 
-DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
+from ignis.bus import Bus, default_url, open_bus
+from ignis.errors import InputError
+
 ANSWER_SECONDS = 3.0
 ATTEMPTS = 3
 
@@ -27,7 +28,7 @@ def keyframe_id(text: str) -> int:
 def parse_arguments(arguments: list[str] | None) -> argparse.Namespace:
     """The command line; ends with code 2 and one message when it is wrong."""
     parser = argparse.ArgumentParser(prog="ignis graph", description=__doc__)
-    parser.add_argument("--lcm-url", default=os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL)
+    parser.add_argument("--lcm-url", default=default_url())
     commands = parser.add_subparsers(dest="command", required=True)
     for name, text in (
         ("withdraw", "take a loop out of the graph; a later match may close it again"),
@@ -58,7 +59,7 @@ def message_of(arguments: argparse.Namespace) -> graph_command_t:
 class Answer:
     """Waits for what the back end says to a command."""
 
-    def __init__(self, bus: lcm.LCM, command: graph_command_t) -> None:
+    def __init__(self, bus: Bus, command: graph_command_t) -> None:
         self.text = ""
         self._command = command
         wants_all = command.command == graph_command_t.SEND_FULL_SET
@@ -81,9 +82,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point."""
     options = parse_arguments(arguments)
     try:
-        bus = lcm.LCM(options.lcm_url)
-    except RuntimeError as error:
-        print(f"ignis graph: cannot open {options.lcm_url}: {error}", file=sys.stderr)
+        bus = open_bus(options.lcm_url)
+    except InputError as error:
+        print(f"ignis graph: {error}", file=sys.stderr)
         return 1
     command = message_of(options)
     answer = Answer(bus, command)

@@ -11,9 +11,9 @@ import time
 from datetime import datetime
 from pathlib import Path
 
-import lcm
 from ignis_lcm.ignis import health_t
 
+from ignis.bus import open_bus
 from ignis.errors import InputError
 from ignis.log_config import CONFIG_CHANNEL, encoded
 from ignis.log_tail import LogTail
@@ -52,7 +52,7 @@ class Recording:
         self._health_sequence = 0
         self._told: tuple[int, str] | None = None
         self._told_at = 0.0
-        self._bus = self._open_bus()
+        self._bus = open_bus(self.url)
         self._start_logger()
 
     def _start_logger(self) -> None:
@@ -81,15 +81,6 @@ class Recording:
             raise InputError(f"{existing[0]} exists, and split recordings never overwrite; choose another name with -o")
         if self.free_mb() < options.keep_free_mb:
             raise InputError(f"only {self.free_mb():.0f} MB are free; --keep-free-mb is {options.keep_free_mb:.0f}")
-
-    def _open_bus(self) -> lcm.LCM:
-        try:
-            return lcm.LCM(self.url)
-        except RuntimeError:
-            raise InputError(
-                f"cannot open the message bus {self.url}. If multicast has no route, run: sudo ip link set lo up "
-                "multicast on && sudo ip route add 224.0.0.0/4 dev lo"
-            ) from None
 
     def _command(self) -> list[str]:
         options = self._options

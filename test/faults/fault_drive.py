@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import ignis_lcm.ignis as types
-import lcm
 from l1_endurance import cpu_seconds
 
+from ignis.bus import open_bus
 from ignis.pipeline import Pipeline
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
@@ -69,7 +69,7 @@ class FaultRun:
         self.killed: set[str] = set()  # and not yet started again
         self.hostile: set[int] = set()  # hashes of what the tests themselves have sent
         self.pipeline = Pipeline(folder, BUS)
-        self.bus = lcm.LCM(BUS)
+        self.bus = open_bus(BUS)
         self._names = names
         self._map_options = ("--port", PORT, *map_options)
         for channel, take in {

@@ -5,11 +5,11 @@ import json
 import threading
 import time
 
-import lcm
 import numpy as np
 import pytest
 from ignis_lcm import ignis as types
 
+from ignis.bus import open_bus
 from stream_client import ViewState
 
 URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
@@ -45,7 +45,7 @@ class Drive:
     """Publishes what the front end and the back end would: a straight drive along -Z, a keyframe every 2 m."""
 
     def __init__(self, drift=0.0, session=0):
-        self.bus = lcm.LCM(URL)
+        self.bus = open_bus(URL)
         self.session = session
         self.generator = np.random.default_rng(7)
         self.step = 0

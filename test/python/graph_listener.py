@@ -4,9 +4,10 @@
 import time
 from collections.abc import Sequence
 
-import lcm
 import numpy as np
 from ignis_lcm.ignis import loop_result_t, smoothed_keyframes_t
+
+from ignis.bus import open_bus
 
 
 class GraphListener:
@@ -16,7 +17,7 @@ class GraphListener:
         self.loops: list[loop_result_t] = []
         self.poses: dict[int, np.ndarray] = {}
         self.revision = -1
-        self._bus = lcm.LCM(url)
+        self._bus = open_bus(url)
         self._bus.subscribe("LOOP_RESULT", self._on_loop).set_queue_capacity(1000)
         self._bus.subscribe("SMOOTHED_KEYFRAMES", self._on_keyframes).set_queue_capacity(1000)
 

@@ -13,6 +13,7 @@ import lcm
 import numpy as np
 from ignis_lcm.ignis import health_t, keyframe_request_t, keyframe_t, loop_result_t, smoothed_keyframes_t
 
+from ignis.bus import open_bus
 from ignis.pipeline import Pipeline
 
 BUS = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
@@ -79,7 +80,7 @@ class BackendRun:
         self._parts: dict[int, smoothed_keyframes_t] = {}
         self._arguments = ("--config", config, "--journal", folder / "journal")
         self._pipeline = Pipeline(folder, BUS)
-        self._bus = lcm.LCM(BUS)
+        self._bus = open_bus(BUS)
         self._bus.subscribe("KEYFRAME_REQUEST", self._on_request)
         self._bus.subscribe("SMOOTHED_KEYFRAMES", self._on_revision).set_queue_capacity(1000)
         self._bus.subscribe("LOOP_RESULT", self._on_loop).set_queue_capacity(1000)

@@ -18,6 +18,8 @@ from dataclasses import dataclass, field
 
 import lcm
 
+from ignis.bus import open_bus
+
 QUEUE = 5000  # messages per subscription
 LONGEST_SLEEP_S = 0.05
 
@@ -51,7 +53,7 @@ class SeededRelay:
         self, a: str, b: str, there: Sequence[str], back: Sequence[str], disturbance: Disturbance, seed: int
     ) -> None:
         self._disturbance = disturbance
-        self._buses = (lcm.LCM(a), lcm.LCM(b))
+        self._buses = (open_bus(a), open_bus(b))
         self._ways: dict[str, Way] = {}
         self._connect(self._buses[0], self._buses[1], there, seed)
         self._connect(self._buses[1], self._buses[0], back, seed)

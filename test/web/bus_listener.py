@@ -7,7 +7,7 @@ import contextlib
 import threading
 from typing import Any
 
-import lcm
+from ignis.bus import open_bus
 
 
 class BusListener:
@@ -20,7 +20,7 @@ class BusListener:
         self.smoothed: list[Any] = []
         self.loops: list[Any] = []
         self.commands: list[Any] = []
-        self._bus = lcm.LCM(url)
+        self._bus = open_bus(url)
         self._subscribe("LIO_STATE", state_t, lambda message: self.states.__setitem__(message.utime, message))
         self._subscribe("SMOOTHED_STATE", state_t, self.smoothed.append)
         self._subscribe("LOOP_RESULT", loop_result_t, self.loops.append)
