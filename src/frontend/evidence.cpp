@@ -64,6 +64,7 @@ void Lio::use_standstill(ScanStats& stats) {
   correct_to_standstill(cautious, *standstill);
   cautious_ = cautious.covariance;
   correct_to_standstill(filter_, *standstill);
+  keyframer_.add_standstill(*standstill);
 }
 
 }  // namespace ignis

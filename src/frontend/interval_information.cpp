@@ -70,6 +70,13 @@ void IntervalInformation::add_scan(const NavState& state, const Matrix6d& inform
   view_.remember(position_in_map() + map_shift_, blind);
 }
 
+void IntervalInformation::add_standstill(const Standstill& standstill) {
+  FilterState filter{state_, with_scans_};
+  correct_to_standstill(filter, standstill);
+  with_scans_ = filter.covariance;
+  informed_ = true;
+}
+
 void IntervalInformation::take(const Matrix6d& information_body, std::span<const Eigen::Vector3d> blind) {
   PoseInformation scan;
   scan.information = to_body(state_).transpose() * information_body * to_body(state_);

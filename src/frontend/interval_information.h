@@ -5,10 +5,12 @@
 
 #include "frontend/eskf.h"
 #include "frontend/regained_view.h"
+#include "frontend/standstill.h"
 
 namespace ignis {
 
-/// What scan matching alone holds on the pose of the newest scan relative to where the interval began.
+/// What scan matching and standing still, without the inertial unit, hold on the pose of the newest scan relative to
+/// where the interval began.
 ///
 /// Two covariances are carried side by side from a pose that is taken as exact, with velocity and biases as uncertain
 /// as the filter says: one sees the scans, one does not. The difference of their pose informations is what the scans
@@ -32,7 +34,12 @@ class IntervalInformation {
   /// was not applied. It did not observe shifts along the unit axes `blind` (odom).
   void add_scan(const NavState& state, const Matrix6d& information_body, std::span<const Eigen::Vector3d> blind);
 
-  /// Attitude then position, body axes of the newest scan. Positive semidefinite; zero before the first scan.
+  /// The filter has taken that the vehicle stood. Between keyframes of five seconds the graph cannot tell: the noise of
+  /// an accelerometer makes decimetres of them along what scans leave open.
+  void add_standstill(const Standstill& standstill);
+
+  /// Attitude then position, body axes of the newest scan. Positive semidefinite; zero before the first
+  /// scan or standstill.
   [[nodiscard]] Matrix6d information() const;
 
  private:
@@ -48,7 +55,7 @@ class IntervalInformation {
   Eigen::Matrix3d map_shift_ = Eigen::Matrix3d::Zero();  ///< [m^2, odom axes] of what scans meet, since the beginning
   InertialInput sum_;                                    ///< of the samples since the newest scan
   int samples_ = 0;
-  bool informed_ = false;  ///< a scan has said something
+  bool informed_ = false;  ///< a scan or a standstill has said something
 
   friend void transfer(auto& io, FieldsOf<IntervalInformation> auto& interval) {
     transfer(io, interval.state_);

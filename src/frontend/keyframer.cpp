@@ -40,6 +40,10 @@ void Keyframer::add_imu(const ImuSample& sample) {
   information_.add_imu(sample);
 }
 
+void Keyframer::add_standstill(const Standstill& standstill) {
+  if (next_id_ > 0) information_.add_standstill(standstill);
+}
+
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
                                             std::span<const Eigen::Vector3d> blind, std::vector<CloudPoint> cloud,
                                             bool confirmed) {

@@ -25,6 +25,9 @@ class Keyframer {
   /// The interval since the last keyframe has an IMU gap.
   void note_gap() { imu_complete_ = false; }
 
+  /// The filter has taken that the vehicle stood, at the scan that comes next.
+  void add_standstill(const Standstill& standstill);
+
   /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied; shifts along
   /// the unit axes `blind` (odom) it does not observe. `cloud` is in the body frame at that state. A keyframe that is
   /// due waits while the pose is not `confirmed`.

@@ -134,6 +134,21 @@ TEST(IntervalInformation, WhatWasSeenAtTheStartAlonePassesAway) {
   EXPECT_GT(driver.sigma_along(), 10.0 * then);
 }
 
+TEST(IntervalInformation, StandingHoldsTheWayThatScansLeaveOpen) {
+  Driver silent;
+  silent.drive_blindly(100, 0.0);
+  Driver told;
+  Standstill standstill;
+  standstill.derivative.block<3, 3>(0, kVelocity).setIdentity();
+  standstill.variance.setConstant(0.02 * 0.02);
+  for (int i = 0; i < 20; ++i) {
+    told.drive_blindly(5, 0.0);
+    told.interval.add_standstill(standstill);
+  }
+  EXPECT_GT(silent.sigma_along(), 0.5);
+  EXPECT_LT(told.sigma_along(), 0.05) << "a quarter of a second after each";
+}
+
 TEST(IntervalInformation, IsToldInBodyAxesWhateverTheHeading) {
   Driver ahead;
   Driver turned(1.1);
