@@ -15,8 +15,9 @@ struct Keyframe {
   std::int32_t session = 0;                      ///< +1 per reset of the front end
   NavState state;                                ///< at the keyframe's instant, frame odom
   Matrix15d covariance = Matrix15d::Identity();  ///< order of ErrorBlock
-  /// Information that scan matching alone (posterior minus prediction) holds on the pose relative to the previous
-  /// keyframe; attitude then position, both in body axes of this keyframe. Zero when no scan was applied.
+  /// Information that scan matching and standing still, without the IMU (posterior minus prediction), hold on the pose
+  /// relative to the previous keyframe; attitude then position, both in body axes of this keyframe. Zero when no scan
+  /// was applied and the vehicle did not stand.
   Matrix6d scan_information = Matrix6d::Zero();
   Utime previous_utime = 0;       ///< [us] instant of the previous keyframe; equals state.utime for the first
   bool stationary = false;        ///< stood still during the whole interval

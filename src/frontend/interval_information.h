@@ -38,8 +38,8 @@ class IntervalInformation {
   /// an accelerometer makes decimetres of them along what scans leave open.
   void add_standstill(const Standstill& standstill);
 
-  /// Attitude then position, body axes of the newest scan. Positive semidefinite; zero before the first
-  /// scan or standstill.
+  /// Attitude then position, body axes of the newest scan. Positive semidefinite; zero before the first scan
+  /// or standstill.
   [[nodiscard]] Matrix6d information() const;
 
  private:
