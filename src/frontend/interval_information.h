@@ -34,12 +34,13 @@ class IntervalInformation {
   /// was not applied. It did not observe shifts along the unit axes `blind` (odom).
   void add_scan(const NavState& state, const Matrix6d& information_body, std::span<const Eigen::Vector3d> blind);
 
-  /// The filter has taken that the vehicle stood. Between keyframes of five seconds the graph cannot tell: the noise of
-  /// an accelerometer makes decimetres of them along what scans leave open.
+  /// The vehicle stood, as the filter has taken it at the scan that comes next; counted at the newest one, a scan
+  /// earlier. The graph cannot tell: along what scans leave open it makes decimetres of five seconds of accelerometer
+  /// noise.
   void add_standstill(const Standstill& standstill);
 
-  /// Attitude then position, body axes of the newest scan. Positive semidefinite; zero before the first scan
-  /// or standstill.
+  /// Attitude then position, body axes of the newest scan. Positive semidefinite; zero before the first scan or
+  /// standstill.
   [[nodiscard]] Matrix6d information() const;
 
  private:

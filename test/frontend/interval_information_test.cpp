@@ -134,19 +134,32 @@ TEST(IntervalInformation, WhatWasSeenAtTheStartAlonePassesAway) {
   EXPECT_GT(driver.sigma_along(), 10.0 * then);
 }
 
+/// A velocity of zero, known to 0.02 m/s.
+Standstill standing() {
+  Standstill standstill;
+  standstill.derivative.block<3, 3>(0, kVelocity).setIdentity();
+  standstill.variance.setConstant(0.02 * 0.02);
+  return standstill;
+}
+
 TEST(IntervalInformation, StandingHoldsTheWayThatScansLeaveOpen) {
   Driver silent;
   silent.drive_blindly(100, 0.0);
   Driver told;
-  Standstill standstill;
-  standstill.derivative.block<3, 3>(0, kVelocity).setIdentity();
-  standstill.variance.setConstant(0.02 * 0.02);
   for (int i = 0; i < 20; ++i) {
     told.drive_blindly(5, 0.0);
-    told.interval.add_standstill(standstill);
+    told.interval.add_standstill(standing());
   }
   EXPECT_GT(silent.sigma_along(), 0.5);
   EXPECT_LT(told.sigma_along(), 0.05) << "a quarter of a second after each";
+}
+
+TEST(IntervalInformation, StandingTellsTheWayWithoutAnyScan) {
+  Driver driver;
+  driver.interval.add_standstill(standing());
+  driver.filter.nominal.utime += kScanUs;
+  driver.interval.add_scan(driver.filter.nominal, Matrix6d::Zero(), {});
+  EXPECT_GT(driver.interval.information()(kAlong, kAlong), 0.0);
 }
 
 TEST(IntervalInformation, IsToldInBodyAxesWhateverTheHeading) {

@@ -16,9 +16,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import lcm
-
-from ignis.bus import open_bus
+from ignis.bus import Bus, open_bus
 
 QUEUE = 5000  # messages per subscription
 LONGEST_SLEEP_S = 0.05
@@ -40,7 +38,7 @@ class Disturbance:
 class Way:
     """One channel's way from one bus to the other; its own generator, so that other channels do not shift it."""
 
-    sink: lcm.LCM
+    sink: Bus
     random: random.Random
     losing: int = 0  # messages of the present burst that are still to be lost
     counts: Counter[str] = field(default_factory=Counter)
@@ -78,7 +76,7 @@ class SeededRelay:
         self._stop.set()
         self._thread.join()
 
-    def _connect(self, source: lcm.LCM, sink: lcm.LCM, channels: Sequence[str], seed: int) -> None:
+    def _connect(self, source: Bus, sink: Bus, channels: Sequence[str], seed: int) -> None:
         for channel in channels:
             self._ways[channel] = Way(sink, random.Random(f"{seed} {channel}"))
             source.subscribe(channel, self._take).set_queue_capacity(QUEUE)
