@@ -141,7 +141,7 @@ def _write(rows: list[Row], folder: Path) -> None:
 
 def evaluate(arguments: argparse.Namespace) -> int:
     """Simulates and replays everything; both tables are written anew after each drive. 1 when a replay failed."""
-    missing = [name for name in arguments.scenes if not (_CHECKOUT / "config" / "scenes" / f"{name}.json").is_file()]
+    missing = [name for name in arguments.scenes if not (arguments.scene_folder / f"{name}.json").is_file()]
     if missing:
         raise InputError(f"no such scene: {', '.join(missing)}")
     binaries = Path(os.environ["IGNIS_BUILD"]) / "bin"
@@ -152,7 +152,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
 
         def run(drive: tuple[str, int]) -> list[Row]:
-            scene = _CHECKOUT / "config" / "scenes" / f"{drive[0]}.json"
+            scene = arguments.scene_folder / f"{drive[0]}.json"
             inputs = arguments.out / "inputs"
             simulation = simulated(binaries / "l1_sim", scene, drive[1], arguments.config, arguments.scene_set, inputs)
             return [_row(simulation, v, arguments.config, arguments.out / "runs", binaries) for v in variants]
@@ -189,7 +189,10 @@ def _seeds(text: str) -> list[int]:
 def main(arguments: list[str] | None = None) -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(prog="ignis evaluate", description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes", type=lambda text: text.split(","), default=list(_SCENES), help="in config/scenes")
+    parser.add_argument(
+        "--scenes", type=lambda text: text.split(","), default=list(_SCENES), help="names in the scene folder"
+    )
+    parser.add_argument("--scene-folder", type=Path, default=_CHECKOUT / "config" / "scenes")
     parser.add_argument("--seeds", type=_seeds, default=[1, 2, 3], help="1-5 or 1,3,7 (default 1-3)")
     parser.add_argument("--config", type=Path, default=_CHECKOUT / "config" / "ignis8_tuned.json")
     parser.add_argument("--variant", type=_variant, action="append", help="NAME:section.key=value,...; repeatable")

@@ -14,13 +14,14 @@ void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Sca
   const Eigen::Vector3d& position = filter_.nominal.T_odom_body.translation;
   const Eigen::Matrix3d in_map = cautious_.block<3, 3>(kPosition, kPosition);
   const Eigen::Matrix3d since_start = in_map + drift_.shift_since_start(position);
-  trust_.note_scan({.stats = stats,
-                    .position = position,
-                    .position_sigma = std::sqrt(in_map.diagonal().maxCoeff()),
-                    .sigma_since_start = std::sqrt(since_start.diagonal().maxCoeff()),
-                    .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
-                    .acceleration_sigma =
-                        std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff())});
+  trust_.note_scan(
+      {.stats = stats,
+       .position = position,
+       .position_sigma = std::sqrt(in_map.diagonal().maxCoeff()),
+       .sigma_since_start = std::sqrt(since_start.diagonal().maxCoeff()),
+       .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
+       .acceleration_sigma = std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff()),
+       .restless = matcher_.is_restless()});
 }
 
 /// Where scans and the IMU contradict each other along a direction that scans hardly observe, scans are wrong.

@@ -62,6 +62,7 @@ struct FrontendConfig {
   double salient_sigma = 4.0;
   double salient_share = 0.0015;
   double contradiction_sigma = 4.2;
+  double moving_surface_sigma = 3.0;
   int map_average_points = 1;
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
@@ -201,6 +202,8 @@ struct FrontendConfig {
                  "taken for chance");
     visit.number("contradiction_sigma", self.contradiction_sigma, {0.0, 100.0}, "sigma",
                  "velocity that scans take back from the IMU within 2 s along a hardly observed direction; 0: off");
+    visit.number("moving_surface_sigma", self.moving_surface_sigma, {0.0, 100.0}, "sigma",
+                 "distance from the map at which surfaces that few others face the way of have moved; 0: off");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
     visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",

@@ -61,7 +61,8 @@ double largest_sigma(const ErrorCovariance& covariance, ErrorBlock block) {
 
 }  // namespace
 
-ScanMatcher::ScanMatcher(const FrontendConfig& config) : config_(config), plane_finder_(config) {
+ScanMatcher::ScanMatcher(const FrontendConfig& config)
+    : config_(config), plane_finder_(config), moving_surfaces_(config) {
   config::require_valid(config, "frontend");
 }
 
@@ -69,6 +70,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
                                std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since) {
   salient_since_ = salient_since;
   speed_is_known_ = largest_sigma(predicted.covariance, kVelocity) < kKnownSpeed;
+  expect(predicted);
   MatchResult result;
   result.filter = predicted;
   result.filter.nominal.T_odom_body = T_start;
@@ -122,6 +124,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       constraints_.push_back({point_body, plane, distance, smoothness, 1.0});
     }
   }
+  leave_out_moving_surfaces(map.scans());
   leave_out_new_surfaces(map.scans());
   double range_sum = 0.0;
   double scan_sum = 0.0;
@@ -143,6 +146,34 @@ double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, con
   if (smoothness == 1.0) return of_all;
   const std::optional<Eigen::Vector3d> own = map.own_voxel(query, kPointsOfAMean);
   return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
+}
+
+void ScanMatcher::expect(const FilterState& predicted) {
+  const Utime now = predicted.nominal.utime;
+  if (last_scan_ > 0) scan_seconds_ += kShareOfNewestScan * (seconds_between(last_scan_, now) - scan_seconds_);
+  T_odom_predicted_ = predicted.nominal.T_odom_body;
+  prior_.position_covariance = predicted.covariance.block<3, 3>(kPosition, kPosition);
+  prior_.velocity_covariance = predicted.covariance.block<3, 3>(kVelocity, kVelocity);
+  prior_.seconds = last_scan_ > 0 ? seconds_between(last_scan_, now) : 0.0;
+  last_scan_ = now;
+}
+
+void ScanMatcher::leave_out_moving_surfaces(int newest_scan) {
+  const Eigen::Matrix3d R = T_odom_predicted_.rotation.toRotationMatrix();
+  const Eigen::Vector3d& t = T_odom_predicted_.translation;
+  surfaces_.clear();
+  for (const Constraint& constraint : constraints_) {
+    const double scans = std::max(newest_scan + 1.0 - constraint.plane.mean_scan, 1.0);
+    surfaces_.push_back({.point = R * constraint.point_body + t,
+                         .normal = constraint.plane.normal,
+                         .distance = residual(R, t, constraint),
+                         .age_s = scans * scan_seconds_,
+                         .weight = constraint.smoothness});
+  }
+  const std::vector<bool>& moved = moving_surfaces_.judge(surfaces_, prior_);
+  prior_.seconds = 0.0;
+  std::size_t i = 0;
+  std::erase_if(constraints_, [&](const Constraint&) { return moved[i++]; });
 }
 
 void ScanMatcher::leave_out_new_surfaces(int newest_scan) {
@@ -293,7 +324,9 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
     }
   }
   Matrix6d used = result.reliable.information;
-  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0 && !distrusts_weak_shifts_) {
+  // Among things that move, certain points are so only while the prediction finds out which of them do.
+  const bool few_are_believed = !distrusts_weak_shifts_ && (speed_is_known_ || !is_restless());
+  if (config_.project_degenerate && degeneracy_.degenerate_directions > 0 && few_are_believed) {
     const std::optional<Matrix6d> more = step_along_degenerate(iterate, result.salient);
     if (!more) return false;
     used += *more;

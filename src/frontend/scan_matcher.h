@@ -10,6 +10,7 @@
 #include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
 #include "frontend/local_map.h"
+#include "frontend/moving_surfaces.h"
 #include "frontend/plane_finder.h"
 #include "frontend/plane_fit.h"
 #include "frontend/salient_points.h"
@@ -55,6 +56,9 @@ class ScanMatcher {
                                   std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                                   int salient_since = 0);
 
+  /// True while surfaces are found to move along a direction that few others face, see MovingSurfaces.
+  [[nodiscard]] bool is_restless() const { return moving_surfaces_.is_restless(); }
+
   /// What a few planes said of a shift has been shown to be wrong. From here on shifts that so few observe count as not
   /// observed, and salient points, which may be the same, say nothing.
   void distrust_weak_shifts() { distrusts_weak_shifts_ = true; }
@@ -76,12 +80,16 @@ class ScanMatcher {
     Matrix6d normal_noise = Matrix6d::Zero();  ///< what errors of the normals add to it
   };
 
+  /// Notes what is known without the scan.
+  void expect(const FilterState& predicted);
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
   /// Where a plane lies along its normal [m]. Of a smooth one all neighbours tell. Where an edge or a corner passes for
   /// a plane, their mean is off to one side, before the edge or behind it, alike in scan after scan: the rougher the
   /// plane, the more is told by the points of the query's own voxel, which lie where the query does.
   [[nodiscard]] static double distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
                                              const LocalMap& map);
+  /// Drops the constraints to surfaces that have moved, where they are among the few that face their way.
+  void leave_out_moving_surfaces(int newest_scan);
   /// Drops the constraints to surfaces that the map has held for a moment only, as long as enough is left without them.
   /// What moves is always new where it is. It is a small part of a scan, yet along an aisle whose ends are out of range
   /// a forklift that goes by can be most of what faces along the way, and it says what its own speed is. What stands is
@@ -120,6 +128,12 @@ class ScanMatcher {
   double pooled_variance_ = 0.0;  ///< see is_salient
   int salient_since_ = 0;
   bool speed_is_known_ = false;
+  MovingSurfaces moving_surfaces_;
+  std::vector<MatchedSurface> surfaces_;
+  Pose T_odom_predicted_;
+  PriorMotion prior_;
+  Utime last_scan_ = 0;
+  double scan_seconds_ = 0.1;   ///< from scan to scan, running mean
   double salient_share_ = 0.0;  ///< of the matched points, running mean over half a second of scans
   bool distrusts_weak_shifts_ = false;
 
@@ -127,6 +141,9 @@ class ScanMatcher {
     transfer(io, matcher.blind_directions_);
     io.number(matcher.salient_share_);
     io.number(matcher.distrusts_weak_shifts_);
+    transfer(io, matcher.moving_surfaces_);
+    io.number(matcher.last_scan_);
+    io.number(matcher.scan_seconds_);
   }
 };
 

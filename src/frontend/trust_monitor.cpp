@@ -38,6 +38,7 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   sigma_since_start_ = evidence.sigma_since_start;
   follow(evidence.position);
   acceleration_sigma_ = evidence.acceleration_sigma;
+  restless_ = evidence.restless;
   last_reason_ = text(stats.reason);
   if (!last_applied_) last_applied_ = stats.utime;
   corrections_.push_back({stats.utime, evidence.velocity_correction});
@@ -128,7 +129,7 @@ Trust TrustMonitor::trust() const {
   if (lost_ || unseen_ || position_sigma_ > config_.lost_sigma_m || is_out_of_sight()) return Trust::kLost;
   if (scans_since_applied_ >= kScansUntilDegraded || position_sigma_ > config_.degraded_sigma_m ||
       sigma_since_start_ > usual_sigma() || seconds_without_imu() > kSilentImuSeconds || scans_to_confirm_ > 0 ||
-      disagreement() > kMaxDisagreement) {
+      disagreement() > kMaxDisagreement || restless_) {
     return Trust::kDegraded;
   }
   return Trust::kOk;
@@ -165,6 +166,7 @@ std::string TrustMonitor::reason() const {
     return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),
                        kOpinionSeconds);
   }
+  if (restless_) return "most of what faces along the way moves: the way is dead reckoned";
   if (sigma_since_start_ > usual_sigma()) {
     return std::format("position sigma since the start {:.2f} m (limit {:.2f}): a part of the way was not observed",
                        sigma_since_start_, usual_sigma());

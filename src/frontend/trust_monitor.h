@@ -26,6 +26,7 @@ struct ScanEvidence {
   double sigma_since_start = 0.0;                                 ///< [m] the same against the first pose
   Eigen::Vector3d velocity_correction = Eigen::Vector3d::Zero();  ///< [m/s] odom axes, zero when not applied
   double acceleration_sigma = 0.0;  ///< [m/s^2] of the acceleration that the IMU is believed to feel, largest axis
+  bool restless = false;            ///< what few surfaces say is not believed, since some of them move
 };
 
 /// Judges from scans and stamps alone whether the pose may be trusted, and says why not.
@@ -96,6 +97,7 @@ class TrustMonitor {
   double driven_m_ = 0.0;                           ///< metre by metre: what a vehicle that stands jitters by is no way
   Eigen::Vector3d mark_ = Eigen::Vector3d::Zero();  ///< [m] odom, where the last of them ended
   double acceleration_sigma_ = 0.0;
+  bool restless_ = false;
   std::deque<Correction> corrections_;
 
   friend void transfer(auto& io, FieldsOf<Correction> auto& correction) {
@@ -120,6 +122,7 @@ class TrustMonitor {
     io.number(monitor.driven_m_);
     io.matrix(monitor.mark_);
     io.number(monitor.acceleration_sigma_);
+    io.number(monitor.restless_);
     io.list(monitor.corrections_);
   }
 };

@@ -84,6 +84,16 @@ TEST(TrustMonitor, APoseThatIsNotKnownIsNotOk) {
   EXPECT_EQ(feed.monitor.trust(), Trust::kLost);
 }
 
+TEST(TrustMonitor, AmongThingsThatMoveThePoseIsNotOk) {
+  Feed feed;
+  feed.evidence.restless = true;
+  feed.run(1);
+  expect(feed.monitor, Trust::kDegraded, "most of what faces along the way moves");
+  feed.evidence.restless = false;
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "OK");
+}
+
 TEST(TrustMonitor, APoseThatCameOffOnTheWayIsNotOkThoughTheMapHoldsIt) {
   Feed feed;
   feed.evidence.sigma_since_start = 0.6;
