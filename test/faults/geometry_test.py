@@ -56,12 +56,12 @@ def test_fault_f10_among_trucks_that_four_of_five_points_lie_on_the_pose_is_neve
 
 
 def test_fault_f10_people_on_both_sides_do_not_take_the_vehicle_with_them_unnoticed(tmp_path: Path) -> None:
-    """Of the points of an L1 that face along the way most lie on people; without a look at what moves three of four
-    scans are OK and far off."""
+    """Of the points of an L1 that face along the way most lie on people; without a look at what moves 72 % of the scans
+    of the first drive are OK and far off, and its NEES is 7,000."""
     write_scene(tmp_path / "scenes", "people", people_in_a_hall(50))
     for row in _evaluated(tmp_path / "scenes", _CONFIG / "ignis8_tuned.json", SEEDS, ["lidar.range_noise_m=0.02"]):
         assert row["silent_percent"] == 0.0, f"seed {row['seed']}"
-        assert row["inside_percent"] >= 97.0, f"seed {row['seed']}"
+        assert row["nees_position"] <= 20.0, f"seed {row['seed']}"
 
 
 def test_fault_f10_a_direction_that_no_scan_observes_is_named_within_five_scans(
