@@ -22,10 +22,6 @@ constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say littl
 // A map of so many points, a second of L1 scans, adds as much to a distance as the point does. NIS of a standing L1 in
 // that second: 100 to 200 without this, 2 to 6 of 6 degrees of freedom with it.
 constexpr double kNoisyMapPoints = 20'000.0;
-// Map points that are younger than this on average, half a second of L1 scans, may be those of something that moves: it
-// was elsewhere before. Looked for among 6, 10 and 14.
-constexpr double kScansOfANewSurface = 10.0;
-constexpr double kLeastSettledShare = 0.3;  // of a scan's planes: below, the place is new and not what is in it
 constexpr double kKnownSpeed = 0.05;        // m/s, sigma
 constexpr double kShareOfNewestScan = 0.1;  // in running means: half a second of scans
 constexpr double kKnownShift = 0.1;         // m: a direction that salient points hold so well is not reported as open
@@ -156,35 +152,6 @@ void ScanMatcher::expect(const FilterState& predicted) {
   prior_.velocity_covariance = predicted.covariance.block<3, 3>(kVelocity, kVelocity);
   prior_.seconds = last_scan_ > 0 ? seconds_between(last_scan_, now) : 0.0;
   last_scan_ = now;
-}
-
-void ScanMatcher::leave_out_moving_surfaces(int newest_scan) {
-  const Eigen::Matrix3d R = T_odom_predicted_.rotation.toRotationMatrix();
-  const Eigen::Vector3d& t = T_odom_predicted_.translation;
-  surfaces_.clear();
-  for (const Constraint& constraint : constraints_) {
-    const double scans = std::max(newest_scan + 1.0 - constraint.plane.mean_scan, 1.0);
-    surfaces_.push_back({.point = R * constraint.point_body + t,
-                         .normal = constraint.plane.normal,
-                         .distance = residual(R, t, constraint),
-                         .age_s = scans * scan_seconds_,
-                         .weight = constraint.smoothness});
-  }
-  const std::vector<bool>& moved = moving_surfaces_.judge(surfaces_, prior_);
-  prior_.seconds = 0.0;
-  std::size_t i = 0;
-  std::erase_if(constraints_, [&](const Constraint&) { return moved[i++]; });
-}
-
-void ScanMatcher::leave_out_new_surfaces(int newest_scan) {
-  if (!speed_is_known_) return;
-  const auto is_new = [&](const Constraint& constraint) {
-    return constraint.plane.mean_scan > newest_scan - kScansOfANewSurface;
-  };
-  const auto settled = std::ssize(constraints_) - std::ranges::count_if(constraints_, is_new);
-  const double needed =
-      std::max(kLeastSettledShare * static_cast<double>(constraints_.size()), static_cast<double>(config_.min_matches));
-  if (static_cast<double>(settled) >= needed) std::erase_if(constraints_, is_new);
 }
 
 ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
