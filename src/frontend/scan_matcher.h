@@ -129,10 +129,10 @@ class ScanMatcher {
   int salient_since_ = 0;
   bool speed_is_known_ = false;
   MovingSurfaces moving_surfaces_;
-  std::vector<MatchedSurface> surfaces_;
-  Pose T_odom_predicted_;
+  std::vector<MatchedSurface> surfaces_;  ///< the constraints as MovingSurfaces wants them
+  Pose T_odom_predicted_;                 ///< this and the next: without the scan, whatever the iterate has become
   PriorMotion prior_;
-  Utime last_scan_ = 0;
+  Utime last_scan_ = 0;         ///< 0: none yet
   double scan_seconds_ = 0.1;   ///< from scan to scan, running mean
   double salient_share_ = 0.0;  ///< of the matched points, running mean over half a second of scans
   bool distrusts_weak_shifts_ = false;

@@ -27,7 +27,7 @@ class Street {
           {.point = turn * point, .normal = turn * normal, .distance = off + noise(random_), .age_s = age});
     };
     for (int i = 0; i < 200; ++i) {
-      add({0.1 * (i % 20), 0.0, -0.1 * i}, kUp, 0.0, 3.0);
+      add({0.1 * (i % 20), 0.0, -0.1 * i}, kUp, floor_is_off_by, 3.0);
       add({5.0, 0.01 * i, -0.1 * i}, -Eigen::Vector3d::UnitX(), 0.0, 3.0);
     }
     facing_from_ = surfaces.size();
@@ -48,6 +48,7 @@ class Street {
   PriorMotion prior{.position_covariance = 1e-4 * Eigen::Matrix3d::Identity()};
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
   int patches = 4;
+  double floor_is_off_by = 0.0;  ///< [m]
 
  private:
   std::mt19937 random_{1};
@@ -95,10 +96,24 @@ TEST(MovingSurfaces, AVehicleThatDoesNotKnowItsSpeedSeesAllMoveAndBelievesIt) {
   EXPECT_EQ(street.scan(0.1), 0);
 }
 
+TEST(MovingSurfaces, WhatIsOldHasNotMoved) {
+  Street street;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(street.scan(0.4, 3.0), 0) << "the map or the pose is off";
+  EXPECT_FALSE(street.judge.is_restless());
+}
+
+TEST(MovingSurfaces, WhereMoreThanTheFewIsOffThePoseIs) {
+  Street street;
+  street.floor_is_off_by = 0.2;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(street.scan(0.2), 0);
+  EXPECT_FALSE(street.judge.is_restless());
+}
+
 TEST(MovingSurfaces, OldOnesMayBeOffByWhatThePositionIsUncertainBy) {
   Street street;
   street.prior.position_covariance = 0.25 * Eigen::Matrix3d::Identity();
   EXPECT_EQ(street.scan(0.4, 20.0), 0);
+  EXPECT_EQ(street.scan(0.4, 1.5), 0);
   EXPECT_EQ(street.scan(0.4, 0.2), 20) << "those of a moment ago may not";
 }
 
