@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`./ignis bench`: ours and the peers over the same simulated drives, on the same core, in one table."""
+"""`./ignis bench`: ours and the peers over the same drives, on the same core, in one table.
+
+Simulated drives (--scenes, --seeds), or a recording (--recording). Without ground truth of that, how far its end is
+from its start is told instead of errors, which is one where the vehicle came back.
+"""
 
 import argparse
 import json
@@ -7,11 +11,13 @@ import os
 import platform
 import statistics
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ignis.benching.inputs import Drive, make_drive, sensor_of
+from ignis.benching.inputs import Drive, make_drive, recorded_drive, sensor_of
 from ignis.benching.systems import OURS, PEERS, Outcome, peers_python, run_ours, run_peer
+from ignis.comparing.estimates import AXES
 from ignis.errors import InputError, run_command
 from ignis.files import write_text
 
@@ -32,6 +38,7 @@ _COLUMNS = (
     ("ate_rmse_m", "ATE m", "{:.3f}"),
     ("rpe_10m_rmse_m", "RPE/10 m", "{:.3f}"),
     ("end_error_m", "end m", "{:.3f}"),
+    ("end_to_start_m", "end to start m", "{:.3f}"),
     ("scan_p50_ms", "ms p50", "{:.2f}"),
     ("scan_p99_ms", "ms p99", "{:.2f}"),
     ("cpu_s", "CPU s", "{:.1f}"),
@@ -51,25 +58,26 @@ def table(outcomes: list[Outcome]) -> str:
     for scene in dict.fromkeys(outcome.drive.scene for outcome in outcomes):
         here = [outcome for outcome in outcomes if outcome.drive.scene == scene]
         seeds = len({outcome.drive.seed for outcome in here})
-        lines += [f"### {scene} ({seeds} seed{'s' if seeds > 1 else ''})", ""]
-        lines += [
-            "| system | " + " | ".join(title for _, title, _ in _COLUMNS) + " | ATE / best peer | CPU / fastest peer |"
-        ]
-        lines += ["|---" * (len(_COLUMNS) + 3) + "|"]
+        drawn = f"{seeds} seed{'s' if seeds > 1 else ''}" if here[0].drive.seed else "recording"
+        lines += [f"### {scene} ({drawn})", ""]
+        columns = [each for each in _COLUMNS if any(each[0] in outcome.figures for outcome in here)]
+        titles = [title for _, title, _ in columns]
+        lines += ["| system | " + " | ".join(titles) + " | ATE / best peer | CPU / fastest peer |"]
+        lines += ["|---" * (len(columns) + 3) + "|"]
         by_system = {name: [o for o in here if o.system == name] for name in (*OURS, *PEERS)}
         peers = [outcome for name in PEERS for outcome in by_system[name]]
         for name, group in by_system.items():
             if group:
-                lines.append(f"| {name} | " + " | ".join(_cells(group, peers)) + " |")
+                lines.append(f"| {name} | " + " | ".join(_cells(group, peers, columns)) + " |")
         lines.append("")
     return "\n".join(lines)
 
 
-def _cells(group: list[Outcome], peers: list[Outcome]) -> list[str]:
+def _cells(group: list[Outcome], peers: list[Outcome], columns: list[tuple[str, str, str]]) -> list[str]:
     failed = [outcome.figures["failed"] for outcome in group if "failed" in outcome.figures]
     if len(failed) == len(group):
-        return [f"failed: {failed[0]}"] + [""] * (len(_COLUMNS) + 1)
-    medians = [(_median(group, key), form) for key, _, form in _COLUMNS]
+        return [f"failed: {failed[0]}"] + [""] * (len(columns) + 1)
+    medians = [(_median(group, key), form) for key, _, form in columns]
     cells = ["" if value is None else form.format(value) for value, form in medians]
     if failed:
         cells[0] += f" ({len(failed)} of {len(group)} failed: {failed[0]})"
@@ -99,24 +107,42 @@ def _machine(peers_versions: str) -> str:
 def bench(arguments: argparse.Namespace) -> int:
     """Runs everything; writes bench.md and bench.json as it goes, so that an interrupted run keeps what it has."""
     build = Path(os.environ["IGNIS_BUILD"]) / "bin"
-    configs = {"l1": arguments.config, "spinning": arguments.spinning_config}
     requirements = _CHECKOUT / "packaging" / "peer-requirements.txt"
     cache = Path(os.environ.get("IGNIS_CACHE", Path.home() / ".cache" / "ignis"))
     python = peers_python(requirements, cache) if arguments.peers else None
     versions = ", ".join(line for line in requirements.read_text().splitlines() if "==" in line)
     arguments.out.mkdir(parents=True, exist_ok=True)
     outcomes: list[Outcome] = []
-    runs = [(path, seed) for path in _scene_files(arguments) for seed in _seeds(arguments)]
-    for number, (path, seed) in enumerate(runs, 1):
-        print(f"bench: {number} of {len(runs)}: {path.stem}, seed {seed}: simulating", flush=True)
-        config = configs[sensor_of(path)]
-        drive = make_drive(build / "l1_sim", path, seed, config, arguments.out / "inputs")
+    drives = _recorded(arguments) if arguments.recording else _simulated(build / "l1_sim", arguments)
+    for drive, config in drives:
         for outcome in _run_all(build, drive, config, python, arguments):
             outcomes.append(outcome)
             print(f"bench:   {outcome.system}: {_short(outcome.figures)}", flush=True)
         _write(arguments.out, outcomes, _machine(versions))
     print(f"\n{table(outcomes)}\n{arguments.out / 'bench.md'}")
     return 0
+
+
+def _recorded(arguments: argparse.Namespace) -> Iterator[tuple[Drive, Path]]:
+    if arguments.config is None:
+        raise InputError("--recording needs --config, with the mounts of its sensors")
+    print(f"bench: {arguments.recording}: reading", flush=True)
+    drive = recorded_drive(
+        arguments.recording, arguments.config, arguments.gt, arguments.gt_axes, arguments.out / "inputs"
+    )
+    yield drive, arguments.config
+
+
+def _simulated(l1_sim: Path, arguments: argparse.Namespace) -> Iterator[tuple[Drive, Path]]:
+    configs = {
+        "l1": arguments.config or _CHECKOUT / "config" / "ignis8_tuned.json",
+        "spinning": arguments.spinning_config,
+    }
+    runs = [(path, seed) for path in _scene_files(arguments) for seed in _seeds(arguments)]
+    for number, (path, seed) in enumerate(runs, 1):
+        print(f"bench: {number} of {len(runs)}: {path.stem}, seed {seed}: simulating", flush=True)
+        config = configs[sensor_of(path)]
+        yield make_drive(l1_sim, path, seed, config, arguments.out / "inputs"), config
 
 
 def _seeds(arguments: argparse.Namespace) -> range:
@@ -143,7 +169,8 @@ def _run_all(build: Path, drive: Drive, config: Path, python: Path | None, argum
 def _short(figures: dict[str, Any]) -> str:
     if "failed" in figures:
         return f"failed, {figures['failed']}"
-    return f"ATE {figures['ate_rmse_m']:.3f} m, {figures['scan_p50_ms']:.2f} ms per scan, {figures['cpu_s']:.1f} s CPU"
+    key, what = ("ate_rmse_m", "ATE") if "ate_rmse_m" in figures else ("end_to_start_m", "end to start")
+    return f"{what} {figures[key]:.3f} m, {figures['scan_p50_ms']:.2f} ms per scan, {figures['cpu_s']:.1f} s CPU"
 
 
 def _write(out: Path, outcomes: list[Outcome], machine: str) -> None:
@@ -173,7 +200,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, default=1, help="seeds per scene (default 1)")
     parser.add_argument("--first-seed", type=int, default=1, help="the seeds count from here (default 1)")
     parser.add_argument("--peers", type=_names(PEERS), default=list(PEERS), help="with commas between; '' for none")
-    parser.add_argument("--config", type=Path, default=_CHECKOUT / "config" / "ignis8_tuned.json")
+    parser.add_argument(
+        "--recording", type=Path, help="instead of scenes: a recording of any kind that ./ignis import reads, or a log"
+    )
+    parser.add_argument(
+        "--gt", type=Path, help="its ground truth in TUM format (default: what is recorded in it, if so)"
+    )
+    parser.add_argument("--gt-axes", choices=AXES, default="auto", help="axes of that ground truth")
+    parser.add_argument(
+        "--config", type=Path, help="of the recording, or of scenes of an L1 (these: config/ignis8_tuned.json)"
+    )
     parser.add_argument("--spinning-config", type=Path, default=_CHECKOUT / "config" / "spinning.json")
     parser.add_argument("--scene-folder", type=Path, default=_CHECKOUT / "config" / "scenes")
     parser.add_argument(

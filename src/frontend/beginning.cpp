@@ -9,9 +9,10 @@
 namespace ignis {
 namespace {
 
-constexpr int kScansOfMovingStart = 2;      // one gives a velocity, the second confirms it
-constexpr int kScansToConfirmMotion = 40;   // of an L1, as long as the second opinion looks back
-constexpr int kScansToConfirmSession = 60;  // and something to go on
+constexpr int kScansOfMovingStart = 2;                          // one gives a velocity, the second confirms it
+constexpr int kScansToConfirmMotion = 40;                       // of an L1, as long as the second opinion looks back
+constexpr int kScansToConfirmSession = 60;                      // and something to go on
+constexpr std::int64_t kAskingPeriodUs = 3 * kMicrosPerSecond;  // of scans, which takes a quarter of it
 
 /// The position from which a new map begins is exact by definition.
 void define_position(ErrorCovariance& covariance) {
@@ -39,6 +40,29 @@ void Lio::start(const FilterState& first) {
   if (!start_note_.empty()) trust_.note_uncertain_start("new session after a restart", kScansToConfirmSession);
   opinion_.begin(first.nominal.utime);
   drift_.begin(filter_);
+}
+
+/// A vehicle in motion. Dense scans tell its velocity once it goes; of a sparse LiDAR the last second is asked before,
+/// and no start is made until it tells.
+void Lio::start_moving(const FilterState& first) {
+  const Utime now = first.nominal.utime;
+  if (!config_.use_scan_matching || !start_motion_.is_needed()) {
+    start(first);
+    return;
+  }
+  if (last_asked_ && now - *last_asked_ < kAskingPeriodUs) return;
+  last_asked_ = now;
+  const std::optional<BentMotion> motion = start_motion_.find_beside(first.nominal, imu_.samples(), config_.gravity_m);
+  start_finding_ = motion ? describe(*motion) : "start refused, waiting: scans do not tell how fast it goes";
+  if (!motion) return;
+  FilterState found = moving_state(config_, first.nominal, *motion);
+  found.nominal.utime = start_motion_.newest();
+  start_motion_.fill(map_, *motion, found.nominal.T_odom_body);
+  start(found);
+  velocity_known_ = true;
+  mapped_velocity_variance_ = velocity_variance(filter_.covariance);
+  trust_.note_uncertain_start(start_finding_, kScansToConfirmMotion);
+  rebuild_live_state();
 }
 
 /// The IMU was quiet, as at any constant speed. A vehicle that rolls begins with the map that its scans agree on: on

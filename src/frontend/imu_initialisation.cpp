@@ -44,6 +44,19 @@ void condition_on_gravity(FilterState& filter, const Eigen::Vector3d& accel_mean
   filter.covariance = I_KH * filter.covariance * I_KH.transpose() + variance * K * K.transpose();
 }
 
+/// Upright by `up_force`, and with all priors but what that force says of tilt and bias.
+FilterState level_state(const FrontendConfig& config, const Eigen::Vector3d& up_force, double gyro_sigma,
+                        double velocity_sigma) {
+  FilterState filter;
+  filter.nominal.T_odom_body.rotation = level_attitude(up_force);
+  ErrorVector sigma;
+  sigma << Eigen::Vector3d::Constant(kAttitudeSigma), Eigen::Vector3d::Constant(kPositionSigma),
+      Eigen::Vector3d::Constant(velocity_sigma), Eigen::Vector3d::Constant(gyro_sigma),
+      Eigen::Vector3d::Constant(config.accel_bias_sigma), Eigen::Vector2d::Constant(kWideTilt);
+  filter.covariance = sigma.array().square().matrix().asDiagonal();
+  return filter;
+}
+
 /// Why this spread is none of a vehicle at rest; empty when it may be. `noise` is the part of it from sample to sample.
 std::string spread_refusal(std::string_view sensor, std::string_view unit, double sigma, double noise, double limit) {
   if (sigma <= limit) return "";
@@ -54,6 +67,12 @@ std::string spread_refusal(std::string_view sensor, std::string_view unit, doubl
 }
 
 }  // namespace
+
+FilterState moving_state(const FrontendConfig& config, const Eigen::Vector3d& up_force, double variance) {
+  FilterState filter = level_state(config, up_force, config.gyro_bias_sigma, config.moving_velocity_sigma);
+  condition_on_gravity(filter, up_force, config.gravity_m, variance);
+  return filter;
+}
 
 ImuInitialisation::ImuInitialisation(const FrontendConfig& config) : config_(config) {
   config::require_valid(config, "frontend");
@@ -167,22 +186,17 @@ std::string ImuInitialisation::refusal(const Window& window) const {
 }
 
 FilterState ImuInitialisation::first_state(const Window& window, bool at_rest) const {
-  FilterState filter;
-  filter.nominal.T_odom_body.rotation = level_attitude(window.accel_mean);
-  if (at_rest) filter.nominal.gyro_bias = window.gyro_mean;
-  filter.nominal.angular_rate = samples_.back().gyro - filter.nominal.gyro_bias;
-
+  const double variance = config_.imu_noise_accel * config_.imu_noise_accel / window.seconds;
+  if (!at_rest) {
+    const double hidden = config_.moving_accel_sigma * config_.moving_accel_sigma;
+    FilterState filter = moving_state(config_, window.accel_mean, variance + hidden);
+    filter.nominal.angular_rate = samples_.back().gyro;
+    return filter;
+  }
   const double gyro_noise = config_.imu_noise_gyro / std::sqrt(window.seconds);
-  const double gyro_sigma = at_rest ? std::hypot(gyro_noise, 1e-4) : config_.gyro_bias_sigma;
-  const double velocity_sigma = at_rest ? kRestVelocitySigma : config_.moving_velocity_sigma;
-  ErrorVector sigma;
-  sigma << Eigen::Vector3d::Constant(kAttitudeSigma), Eigen::Vector3d::Constant(kPositionSigma),
-      Eigen::Vector3d::Constant(velocity_sigma), Eigen::Vector3d::Constant(gyro_sigma),
-      Eigen::Vector3d::Constant(config_.accel_bias_sigma), Eigen::Vector2d::Constant(kWideTilt);
-  filter.covariance = sigma.array().square().matrix().asDiagonal();
-
-  double variance = config_.imu_noise_accel * config_.imu_noise_accel / window.seconds;
-  if (!at_rest) variance += config_.moving_accel_sigma * config_.moving_accel_sigma;
+  FilterState filter = level_state(config_, window.accel_mean, std::hypot(gyro_noise, 1e-4), kRestVelocitySigma);
+  filter.nominal.gyro_bias = window.gyro_mean;
+  filter.nominal.angular_rate = samples_.back().gyro - filter.nominal.gyro_bias;
   condition_on_gravity(filter, window.accel_mean, config_.gravity_m, variance);
   return filter;
 }

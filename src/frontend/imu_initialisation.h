@@ -11,6 +11,11 @@
 
 namespace ignis {
 
+/// First state of a vehicle in motion: roll and pitch from `up_force` [m/s^2, body axes], the specific force without
+/// what the motion makes of it, of variance `variance` [m^2/s^4] per axis. Velocity unknown (zero with a wide sigma),
+/// biases at their priors, yaw 0, position 0.
+[[nodiscard]] FilterState moving_state(const FrontendConfig& config, const Eigen::Vector3d& up_force, double variance);
+
 /// Finds the first state from IMU samples alone: roll and pitch from gravity, gyro bias (at rest), yaw 0, position 0.
 /// Pose and heading are exact by definition; that the frame which they define may not be level is gravity's tilt in it.
 ///

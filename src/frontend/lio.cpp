@@ -49,6 +49,7 @@ void Lio::reset() {
   initialisation_ = ImuInitialisation(config_);
   start_motion_ = StartMotion(config_);
   start_finding_.clear();
+  last_asked_.reset();
   matcher_ = ScanMatcher(config_);
   map_.clear();
   keyframer_ = Keyframer(config_, session_);
@@ -74,8 +75,9 @@ void Lio::reset() {
 LioStatus Lio::status() const {
   LioStatus status;
   status.running = running_;
-  status.text = initialisation_.report();
-  if (!start_finding_.empty()) status.text += "; " + start_finding_;
+  const bool is_refused_by_scans = !running_ && last_asked_;
+  status.text = is_refused_by_scans ? start_finding_ : initialisation_.report();
+  if (running_ && !start_finding_.empty()) status.text += "; " + start_finding_;
   status.trust = running_ ? trust_.trust() : Trust::kDegraded;
   status.reason = running_ ? trust_.reason() : start_note_.empty() ? status.text : start_note_ + "; " + status.text;
   return status;
@@ -103,7 +105,9 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     live_.utime = sample.utime;
   } else if (!running_) {
     if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
-    if (std::optional<FilterState> first = initialisation_.add(sample)) start(*first);
+    if (const std::optional<FilterState> first = initialisation_.add(sample)) {
+      config_.start == "moving" ? start_moving(*first) : start(*first);
+    }
   }
   std::ranges::move(process_pending(), std::back_inserter(result.scans));
   if (running_) {
@@ -269,8 +273,8 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
   } else {
     const bool is_large = std::ssize(cloud) > config_.max_scan_points;
     every_nth(is_large ? sparse : cloud, config_.max_scan_points, match_points_);
-    const bool is_lost = scans_without_correction_ >= kScansUntilReacquisition;
-    const Pose T_start = is_lost ? reacquire(filter_, match_points_, map_, config_) : filter_.nominal.T_odom_body;
+    const Pose T_start =
+        has_to_search() ? reacquire(filter_, match_points_, map_, config_) : filter_.nominal.T_odom_body;
     const int salient_since = sure_since(config_.match_radius_m);
     const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
     result = matcher_.match(seen, T_start, match_points_, map_, salient_since);
@@ -279,6 +283,14 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
     result.filter.covariance = with_position_at(result.filter.covariance, age);
   }
   return result;
+}
+
+/// The map may lie farther from the points than the matcher sees: nothing was corrected for a while, or the velocity of
+/// a moving start is not known yet.
+bool Lio::has_to_search() const {
+  const double sees = std::max(config_.match_radius_m, config_.wide_match_radius_m);
+  return scans_without_correction_ >= kScansUntilReacquisition ||
+         (!velocity_known_ && filter_.covariance.diagonal().segment<3>(kPosition).maxCoeff() > sees * sees);
 }
 
 /// The first scan of the map since which the position has become less certain by no more than `sigma_m`.

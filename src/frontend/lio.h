@@ -97,6 +97,7 @@ class Lio {
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
                                     double age);
+  [[nodiscard]] bool has_to_search() const;
   [[nodiscard]] int sure_since(double sigma_m) const;
   void count_correction(const MatchResult& match, double age);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
@@ -113,6 +114,7 @@ class Lio {
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
   void start(const FilterState& first);
+  void start_moving(const FilterState& first);
   void ask_scans_for_motion();
   void give_up_resumption();
   void close_gap(Utime first_sample);
@@ -128,8 +130,9 @@ class Lio {
   std::int32_t session_ = 0;
   ImuBuffer imu_;
   ImuInitialisation initialisation_;
-  StartMotion start_motion_;   ///< until the start
-  std::string start_finding_;  ///< what scans said of the motion then
+  StartMotion start_motion_;         ///< until the start
+  std::string start_finding_;        ///< what scans said of the motion then
+  std::optional<Utime> last_asked_;  ///< instant at which scans did not tell how fast the vehicle goes
   ScanSelector selector_;
   Deskewer deskewer_;
   VoxelThinner thinner_;

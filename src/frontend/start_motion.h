@@ -28,6 +28,13 @@ struct SteadyMotion {
   [[nodiscard]] bool is_rolling() const;
 };
 
+/// Motion of a vehicle that keeps neither, at the newest instant, beside what the inertial unit says of it.
+struct BentMotion {
+  SteadyMotion steady;                                     ///< velocity then, and the turn rate that the gyro misses
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< [m/s^2] body axes, that a tilt of the start hides
+  double acceleration_sigma = 0.0;                         ///< [m/s^2] per axis
+};
+
 /// Did the vehicle stand before the start, or roll? To the IMU a constant speed is rest, so the last scans are asked.
 ///
 /// Each speed that it may have had puts the points of these scans into one cloud. Under the true one, surfaces that
@@ -44,36 +51,58 @@ class StartMotion {
   /// The next scan, in time order. What is older than the window is forgotten.
   void add(const Scan& scan);
 
+  /// The newest scan alone is too sparse to be laid on the next one, so the speed has to come from here.
+  [[nodiscard]] bool is_needed() const;
+
+  /// End of the newest scan, of which there must be one.
+  [[nodiscard]] Utime newest() const { return scans_.back().end_utime(); }
+
   /// At the end of the newest scan, when one speed explains the scans far better than all others. Nothing where they
   /// are too few or look alike all along the way, as in a corridor.
   [[nodiscard]] std::optional<SteadyMotion> find();
 
+  /// The same for a vehicle that does not keep its motion: what the inertial unit says of turns and accelerations is
+  /// taken out first. `standing` is the state at that end with no velocity, in an attitude that is off by what the
+  /// acceleration makes of it.
+  [[nodiscard]] std::optional<BentMotion> find_beside(const NavState& standing, std::span<const ImuSample> samples,
+                                                      double gravity_m);
+
   /// Puts the scans into an empty map, for a vehicle that is at `T_odom_body` now.
   void fill(LocalMap& map, const SteadyMotion& motion, Utime now, const Pose& T_odom_body);
 
+  /// The same at the newest instant, after find_beside().
+  void fill(LocalMap& map, const BentMotion& motion, const Pose& T_odom_body);
+
  private:
+  using Motion = Eigen::Matrix<double, 9, 1>;  ///< turn rate, velocity, acceleration
+  using MotionMatrix = Eigen::Matrix<double, 9, 9>;
+
   struct Sample {
-    Eigen::Vector3d point;  ///< [m] in the body axes of the newest instant, as a twist has it
+    Eigen::Vector3d point;  ///< [m] in the body axes of the newest instant
     double seconds;         ///< since that instant, negative
   };
   struct Look {
-    Vector6d step = Vector6d::Zero();  ///< that makes the planes thinner
-    Matrix6d covariance = Matrix6d::Identity();
+    Motion step = Motion::Zero();  ///< that makes the planes thinner; without acceleration unless bends_
+    MotionMatrix covariance = MotionMatrix::Identity();
     double facing = 0.0;    ///< [s^2] of points whose planes face along the way: time between the two, squared
     double evidence = 0.0;  ///< what they say of the speed, relative
     std::vector<std::size_t> witnesses;  ///< those points, in samples_
   };
   struct Candidate {
-    Vector6d twist;
+    Motion motion;
     Look last;
   };
 
-  void place(const Vector6d& twist);
+  void measure();
+  void place(const Motion& motion);
+  void fill_placed(LocalMap& map, const Pose& T_odom_newest) const;
+  [[nodiscard]] std::optional<Candidate> search();
   [[nodiscard]] double seconds_of(double scan) const;
-  [[nodiscard]] Look look(const Vector6d& twist, std::size_t stride);
+  [[nodiscard]] Look look(const Motion& motion, std::size_t stride);
   [[nodiscard]] std::size_t stride_to(std::size_t points) const;
-  [[nodiscard]] Candidate refined(Vector6d twist, int passes, std::size_t stride, std::size_t last_stride);
-  [[nodiscard]] std::optional<SteadyMotion> find_rest();
+  [[nodiscard]] Candidate refined(Motion motion, int passes, std::size_t stride, std::size_t last_stride);
+  [[nodiscard]] std::optional<Candidate> find_rest();
+  [[nodiscard]] static SteadyMotion told(const Candidate& found);
   [[nodiscard]] bool rest_explains(std::span<const std::size_t> witnesses);
 
   FrontendConfig config_;
@@ -81,6 +110,9 @@ class StartMotion {
   PlaneFinder finder_;
   LocalMap map_;
   std::deque<Scan> scans_;
+  bool bends_ = false;             ///< acceleration is looked for as well
+  std::size_t newest_points_ = 0;  ///< of the newest scan as the sensor gave it
+  std::vector<Sample> measured_;   ///< all points of scans_, as if nothing had moved but what the inertial unit told
   std::vector<Sample> samples_;
   std::vector<Eigen::Vector3d> queries_;
 };
@@ -89,7 +121,12 @@ class StartMotion {
 /// mean specific force held what turning at speed feels.
 void set_rolling(FilterState& first, const SteadyMotion& motion, double gravity_m);
 
+/// A vehicle in motion at the newest instant: `standing` has the attitude that the scans were asked with.
+[[nodiscard]] FilterState moving_state(const FrontendConfig& config, const NavState& standing,
+                                       const BentMotion& motion);
+
 /// For people.
 [[nodiscard]] std::string describe(const SteadyMotion& motion);
+[[nodiscard]] std::string describe(const BentMotion& motion);
 
 }  // namespace ignis

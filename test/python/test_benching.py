@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `./ignis bench` hands to the peers, and how it reports them. No peer is needed."""
 
+import dataclasses
 import json
 import signal
 import sys
@@ -11,8 +12,11 @@ import pytest
 
 from ignis.bench import table
 from ignis.benching import peer_runner
-from ignis.benching.inputs import Drive, sensor_of
-from ignis.benching.systems import CPU_LIMIT_S, Outcome, _run_on, failure_reason
+from ignis.benching.inputs import Drive, recorded_drive, sensor_of
+from ignis.benching.systems import CPU_LIMIT_S, Outcome, _judged, _run_on, failure_reason
+from ignis.importers.recorder import Recorder
+from ignis.mounts import Extrinsics
+from ignis.poses import Poses, Trajectory, read_tum
 
 SCAN_US = 50_000
 POINTS = 10
@@ -37,6 +41,12 @@ def test_dense_scans_of_the_rest_are_left_out_but_the_last() -> None:
 
 def test_drive_shorter_than_the_rest_still_gives_two_frames() -> None:
     assert frames(5, 2, "l1") == [(0, 1), (1, 5)]
+
+
+def test_without_a_rest_every_scan_is_a_frame() -> None:
+    first, time_us = np.arange(6) * POINTS, np.arange(5 * POINTS)
+    moving = dataclasses.replace(peer_runner.SENSORS["spinning"], rest_s=0.0)
+    assert peer_runner.frames(first, time_us, 1, moving) == [(10 * i, 10 * i + 10) for i in range(5)]
 
 
 class Recording:
@@ -67,6 +77,61 @@ def test_scene_names_its_sensor(tmp_path: Path) -> None:
     assert sensor_of(scene) == "l1"
     scene.write_text(json.dumps({"lidar": {"model": "spinning"}}))
     assert sensor_of(scene) == "spinning"
+
+
+def recording(path: Path, points: int, truth: bool) -> Path:
+    with Recorder(path, Extrinsics()) as recorder:
+        for scan in range(3):
+            utime = 1_000_000 + scan * 100_000
+            recorder.add_imu(utime, np.zeros(3), np.array([0.0, 0.0, 9.81]))
+            recorder.add_scan(utime + np.arange(points), np.full((points, 3), 5.0), np.zeros(points))
+            if truth:
+                recorder.add_truth(utime, np.array([0.0, 0.0, -float(scan)]), np.array([1.0, 0, 0, 0]), np.zeros(3))
+        recorder.finish()
+    return path
+
+
+def config_file(folder: Path, start: str) -> Path:
+    path = folder / "config.json"
+    path.write_text(json.dumps({"frontend": {"start": start}}))
+    return path
+
+
+def test_a_recording_comes_with_its_truth_its_sensor_and_its_start(tmp_path: Path) -> None:
+    log = recording(tmp_path / "around_the_block.lcm", 500, truth=True)
+    drive = recorded_drive(log, config_file(tmp_path, "at_rest"), None, "auto", tmp_path / "inputs")
+    assert (drive.scene, drive.sensor, drive.log) == ("around_the_block", "l1", log)
+    assert drive.rest_s == peer_runner.REST_S
+    assert drive.truth is not None and read_tum(drive.truth).poses.position[2].tolist() == [0.0, 0.0, -2.0]
+    with np.load(drive.arrays) as arrays:
+        assert arrays["first"].tolist() == [0, 500, 1000, 1500]
+        # Axes of the peers: up is their third.
+        assert arrays["accel"][0].tolist() == pytest.approx([0.0, 0.0, 9.81])
+
+
+def test_a_recording_that_begins_in_motion_has_no_rest_and_dense_scans_are_a_spinning_lidars(tmp_path: Path) -> None:
+    log = recording(tmp_path / "street.lcm", 5000, truth=False)
+    drive = recorded_drive(log, config_file(tmp_path, "moving"), None, "auto", tmp_path / "inputs")
+    assert (drive.sensor, drive.rest_s, drive.truth) == ("spinning", 0.0, None)
+
+
+def test_truth_from_elsewhere_wins_and_is_turned_into_our_axes(tmp_path: Path) -> None:
+    log = recording(tmp_path / "street.lcm", 500, truth=True)
+    forward_along_x = tmp_path / "gt.tum"
+    forward_along_x.write_text("".join(f"{1 + 0.1 * i} {3 * i} 0 0 0 0 0 1\n" for i in range(3)))
+    drive = recorded_drive(log, config_file(tmp_path, "at_rest"), forward_along_x, "auto", tmp_path / "inputs")
+    assert drive.truth is not None
+    assert read_tum(drive.truth).poses.position[2].tolist() == pytest.approx([0.0, 0.0, -6.0])
+
+
+def test_without_truth_the_way_from_the_end_back_to_the_start_is_told() -> None:
+    trajectory = Trajectory(np.arange(3), Poses(np.array([[0, 0, 0], [9, 9, 9], [3, 4, 0.0]]), np.eye(4)[[0, 0, 0]]))
+    drive = Drive("loop", "l1", 0, Path(), Path(), None)
+    judged = _judged("ours: ESKF", drive, trajectory, {"cpu_s": 1.0})
+    assert judged.figures == {"end_to_start_m": 5.0, "cpu_s": 1.0}
+    header = table([judged]).splitlines()[2]
+    assert "### loop (recording)" in table([judged])
+    assert "end to start m" in header and "ATE m" not in header
 
 
 def test_reason_of_a_failure_is_told_in_one_line() -> None:

@@ -7,18 +7,19 @@ frame, so the extrinsics that a peer is told are the identity. Output: a TUM fil
 forward-left-up axes, and JSON with processor seconds, milliseconds per scan and peak memory. Reading and writing are
 not counted.
 
-Every drive begins with a rest, and the peers are told so. RKO-LIO takes its biases from the inertial samples between
+Most drives begin with a rest, and the peers are told so. RKO-LIO takes its biases from the inertial samples between
 its first two scans: 50 ms of an L1 leave 0.014 rad/s of noise on the gyro bias, so its second scan is the end of the
 rest. One scan of an L1 is 1,000 points on a pattern that turns from scan to scan; against a map of one such scan all
-of them turn along with the pattern while the sensor stands still. Their first scan is therefore the whole rest.
+of them turn along with the pattern while the sensor stands still. Their first scan is therefore the whole rest. Where
+there is no rest (--rest 0) they get the scans as they come, and RKO-LIO no phase of initialisation.
 """
 
 import argparse
+import dataclasses
 import itertools
 import json
 import resource
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +27,14 @@ import numpy as np
 REST_S = 3.0
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Sensor:
     """What the settings depend on."""
 
     min_range_m: float
     max_range_m: float
     sparse: bool  # too few points in one scan: scans are merged
+    rest_s: float = REST_S  # the vehicle stands so long at first
 
 
 SENSORS = {
@@ -56,7 +58,7 @@ class RkoLio:
                 voxel_size=0.15 if sensor.sparse else 0.5,
                 max_range=sensor.max_range_m,
                 min_range=sensor.min_range_m,
-                initialization_phase=True,
+                initialization_phase=sensor.rest_s > 0.0,
                 double_downsample=True,
                 max_num_threads=1,
             )
@@ -197,8 +199,10 @@ def _write_tum(path, times_us, poses):
 def frames(first, time_us, merge, sensor):
     """(begin, end) indices of the points of each frame that a peer gets: the first scan, the rest of the standing
     phase (all of it where scans are sparse, its last scan where they are not), then `merge` scans at a time."""
+    if sensor.rest_s == 0.0:
+        return list(itertools.pairwise(first[::merge]))
     begins = time_us[first[:-1]]
-    rest = max(int(np.searchsorted(begins, begins[0] + REST_S * 1e6)), 2)
+    rest = max(int(np.searchsorted(begins, begins[0] + sensor.rest_s * 1e6)), 2)
     standing = [(first[0], first[1]), (first[1] if sensor.sparse else first[rest - 1], first[rest])]
     return standing + list(itertools.pairwise(first[rest::merge]))
 
@@ -239,11 +243,14 @@ def main():
     parser.add_argument("sensor", choices=sorted(SENSORS))
     parser.add_argument("drive", type=Path)
     parser.add_argument("out", type=Path, help="folder for trajectory.tum and cost.json")
+    parser.add_argument("--rest", type=float, default=REST_S, help="the vehicle stands for so many seconds at first")
     arguments = parser.parse_args()
     with np.load(arguments.drive) as file:
         drive = {key: file[key] for key in file.files}
     input_mb = sum(array.nbytes for array in drive.values()) / 2**20
-    stamps, poses, cost = run(arguments.peer, drive, SENSORS[arguments.sensor])
+    stamps, poses, cost = run(
+        arguments.peer, drive, dataclasses.replace(SENSORS[arguments.sensor], rest_s=arguments.rest)
+    )
     # The whole drive lies in memory here, which is no fault of the peer.
     cost["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 - input_mb
     arguments.out.mkdir(parents=True, exist_ok=True)

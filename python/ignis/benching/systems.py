@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ignis import trajectory_error
 from ignis.benching.inputs import Drive
 from ignis.environments import environment_python
@@ -56,7 +58,7 @@ def run_ours(lio_replay: Path, drive: Drive, config: Path, out: Path, core: int)
 
 def run_peer(python: Path, name: str, drive: Drive, out: Path, core: int) -> Outcome:
     """A peer in its own environment, on one thread."""
-    reason, cost = _run_on([python, _RUNNER, name, drive.sensor, drive.arrays, out], core)
+    reason, cost = _run_on([python, _RUNNER, name, drive.sensor, drive.arrays, out, "--rest", drive.rest_s], core)
     if reason:
         return Outcome(name, drive, {"failed": reason})
     cost |= json.loads((out / "cost.json").read_text())
@@ -68,6 +70,9 @@ def run_peer(python: Path, name: str, drive: Drive, out: Path, core: int) -> Out
 
 
 def _judged(name: str, drive: Drive, trajectory: Trajectory, cost: dict[str, float]) -> Outcome:
+    if drive.truth is None:
+        ends = trajectory.poses.position[[0, -1]]
+        return Outcome(name, drive, {"end_to_start_m": float(np.linalg.norm(ends[1] - ends[0]))} | cost)
     try:
         pair = trajectory_error.paired(trajectory, read_tum(drive.truth))
         return Outcome(name, drive, trajectory_error.errors_of(pair, per_scan=False) | cost)

@@ -38,12 +38,12 @@ def read_estimates(folder: Path, gt: Path | None, others: list[Path], axes: str)
         label = path.stem
         while label in trajectories:
             label += "'"
-        trajectories[label] = _in_our_axes(path, axes, notes)
+        trajectories[label] = read_in_our_axes(path, axes, notes)
     truth_file = gt if gt is not None else folder / "ground_truth.tum"
     if gt is None and not truth_file.is_file():
         notes.append("no ground truth: the trajectories are compared with each other")
         return Estimates(folder, trajectories, None, notes)
-    return Estimates(folder, trajectories, _in_our_axes(truth_file, axes, notes), notes)
+    return Estimates(folder, trajectories, read_in_our_axes(truth_file, axes, notes), notes)
 
 
 def label_of(name: str) -> str:
@@ -51,7 +51,8 @@ def label_of(name: str) -> str:
     return LABELS.get(name, name)
 
 
-def _in_our_axes(path: Path, axes: str, notes: list[str]) -> Trajectory:
+def read_in_our_axes(path: Path, axes: str, notes: list[str]) -> Trajectory:
+    """A trajectory from a file in any of AXES; `notes` gets a sentence where the axes were found out."""
     trajectory = read_tum(path)
     if axes == "forward_left_up":
         return trajectory_error.in_our_axes(trajectory)

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `frontend.start` "moving": a vehicle that turns and brakes when the first data come.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/frames.h"
+#include "common/so3.h"
+#include "frontend/imu_initialisation.h"
+#include "frontend/lio_runner.h"
+#include "frontend/start_motion.h"
+
+namespace ignis {
+namespace {
+
+using test::Drive;
+using test::LioRun;
+using test::Sensors;
+
+constexpr double kSpeed = 1.6;
+constexpr double kBraking = -0.4;
+
+/// A curve to the left of 3 m radius, braking until it creeps.
+Pose braking_curve(double t) {
+  const double radius = 3.0;
+  const double braked = std::min(t, 3.5);
+  const double way = kSpeed * braked + 0.5 * kBraking * braked * braked + (t - braked) * (kSpeed + kBraking * braked);
+  const double turn = way / radius;
+  return {so3::exp(Eigen::Vector3d(0.0, turn, 0.0)),
+          Eigen::Vector3d(radius * (std::cos(turn) - 1.0), 0.0, -radius * std::sin(turn))};
+}
+
+FrontendConfig moving_config() {
+  FrontendConfig config = test::tuned_config();
+  config.start = "moving";
+  return config;
+}
+
+/// [m] How far off poses in any case are, and those that were reported as OK; the first pose is laid on the true one.
+struct Worst {
+  double of_all = 0.0;
+  double of_ok = 0.0;
+};
+
+Worst worst_errors(const LioRun& run, const Drive& drive) {
+  Worst worst;
+  std::optional<Pose> T_odom_world;
+  for (const ScanResult& scan : run.scans) {
+    if (!scan.has_state) continue;
+    const Pose truth = drive.truth(test::drive_seconds(drive, scan.state.utime));
+    if (!T_odom_world) T_odom_world = scan.state.T_odom_body * truth.inverse();
+    const double error = (*T_odom_world * truth.translation - scan.state.T_odom_body.translation).norm();
+    worst.of_all = std::max(worst.of_all, error);
+    if (scan.trust == Trust::kOk) worst.of_ok = std::max(worst.of_ok, error);
+  }
+  return worst;
+}
+
+TEST(MovingStart, AnL1ThatTurnsAndBrakesGoesOnAtTheTrueSpeed) {
+  for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+    const Drive drive = test::simulate(test::furnished_hall(), braking_curve, 8.0, Sensors{}, seed);
+    const LioRun run = run_lio(moving_config(), drive);
+    ASSERT_TRUE(run.status.running) << run.status.text;
+    const auto first = std::ranges::find_if(run.scans, [](const ScanResult& scan) { return scan.has_state; });
+    const double t = test::drive_seconds(drive, first->state.utime);
+    ASSERT_LT(t, 3.0);
+    EXPECT_NEAR(first->state.v_odom.norm(), kSpeed + kBraking * t, 0.15);
+    EXPECT_LT(test::aligned_error(run, drive), 0.02);
+    EXPECT_LT(worst_errors(run, drive).of_ok, 0.3);
+  }
+}
+
+TEST(MovingStart, TheMapIsLevelThoughTheAccelerationLooksLikeATilt) {
+  const Drive drive = test::simulate(test::furnished_hall(), braking_curve, 2.5, Sensors{}, 4);
+  const LioRun run = run_lio(moving_config(), drive);
+  ASSERT_TRUE(run.status.running) << run.status.text;
+  const ScanResult& last = run.scans.back();
+  const Eigen::Vector3d up = last.state.T_odom_body.rotation.conjugate() * frames::up();
+  const double tilt = std::acos(std::clamp(up.dot(frames::up()), -1.0, 1.0));
+  // Braking at 0.4 and turning at 0.3 to 0.9 m/s^2 make 0.05 to 0.1 rad of it.
+  EXPECT_LT(tilt, 0.03);
+  EXPECT_LT(std::sqrt(last.covariance(kAttitude, kAttitude)), 0.02) << "and it says so";
+}
+
+TEST(MovingStart, WaitsAndSaysWhyWhereScansDoNotTellTheSpeed) {
+  const Drive drive = test::simulate(test::bare_corridor(), test::straight_drive(0.0, 1.5), 4.0, Sensors{}, 5);
+  const LioRun run = run_lio(moving_config(), drive);
+  EXPECT_FALSE(run.status.running);
+  EXPECT_EQ(run.status.text, "start refused, waiting: scans do not tell how fast it goes");
+  EXPECT_EQ(test::count(run, ScanReason::kNotInitialised), static_cast<int>(run.scans.size()));
+}
+
+TEST(MovingStart, AVehicleThatStandsBeginsAsOneThatStands) {
+  const Drive drive = test::simulate(test::furnished_hall(), test::straight_drive(4.0, 1.0), 8.0, Sensors{}, 6);
+  const LioRun run = run_lio(moving_config(), drive);
+  ASSERT_TRUE(run.status.running) << run.status.text;
+  const auto first = std::ranges::find_if(run.scans, [](const ScanResult& scan) { return scan.has_state; });
+  EXPECT_LT(first->state.v_odom.norm(), 0.1);
+  EXPECT_LT(test::aligned_error(run, drive), 0.02);
+}
+
+/// Between two scans the car goes farther than the matcher sees.
+TEST(MovingStart, DenseScansAreSearchedForWidelyUntilTheSpeedIsKnown) {
+  Sensors sensors;
+  sensors.car = true;
+  sensors.scan_hz = 10.0;
+  sensors.max_range = 80.0;
+  FrontendConfig config = moving_config();
+  config.start_seconds = 0.2;
+  config.max_range_m = 80.0;
+  config.voxel_size_m = 0.2;
+  config.match_radius_m = 0.3;
+  config.wide_match_radius_m = 0.6;
+  config.max_mean_innovation = 0.3;
+  config.max_scan_correction_m = 3.0;
+  config.max_scan_velocity_corr = 3.0;
+  config.map_window_m = 100.0;
+  const Drive drive = test::simulate(test::street(), test::straight_drive(0.0, 12.0), 3.0, sensors, 7);
+  const LioRun run = run_lio(config, drive);
+  EXPECT_LT((run.scans.back().state.v_odom - Eigen::Vector3d(0.0, 0.0, -12.0)).norm(), 0.3);
+  EXPECT_LT(test::aligned_error(run, drive), 0.1);
+}
+
+TEST(MovingStart, AStateFromAForceThatIsKnownIsAsLevelAsTheForceIsSure) {
+  const FrontendConfig config = moving_config();
+  const Eigen::Vector3d up_force = 9.81 * Eigen::Vector3d(0.05, 1.0, -0.08).normalized();
+  const FilterState sure = moving_state(config, up_force, 1e-4);
+  const FilterState vague = moving_state(config, up_force, 1.0);
+  EXPECT_LT((sure.nominal.T_odom_body.rotation * up_force - 9.81 * frames::up()).norm(), 1e-9);
+  const double bias_alone = config.accel_bias_sigma / config.gravity_m;
+  EXPECT_NEAR(std::sqrt(sure.covariance(kGravityTilt, kGravityTilt)), bias_alone, 0.1 * bias_alone);
+  EXPECT_GT(std::sqrt(vague.covariance(kGravityTilt, kGravityTilt)), 0.09);
+}
+
+}  // namespace
+}  // namespace ignis
