@@ -11,7 +11,7 @@ from ignis.errors import InputError
 from ignis.evaluate import Row, Variant, table
 from ignis.evaluation.consistency import band, inside_percent, nees_of, silent_percent
 from ignis.evaluation.drives import Simulation, changed_scene
-from ignis.poses import Poses, Trajectory, quaternion_from_matrix, write_tum
+from ignis.poses import Poses, Trajectory, quaternion_from_matrix, rotation_matrix, write_tum
 
 
 def _rotation(vector: np.ndarray) -> np.ndarray:
@@ -23,8 +23,9 @@ def _rotation(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
 
 
-def _replay(folder: Path, seed: int, inflation: float) -> Trajectory:
-    """A folder of a replay with errors `inflation` times what it says; returns the truth, which starts off level."""
+def _replay(folder: Path, seed: int, inflation: float, began: Poses | None = None) -> Trajectory:
+    """A folder of a replay with errors `inflation` times what it says; returns the truth, which starts off level.
+    `began`: where in frame odom the first pose lies (level)."""
     random = np.random.default_rng(seed)
     count = 400
     utime = np.arange(count) * 50_000 + 1_000_000
@@ -40,7 +41,13 @@ def _replay(folder: Path, seed: int, inflation: float) -> Trajectory:
         true_position.append(p + error[3:])
         true_quaternion.append(quaternion_from_matrix(R @ _rotation(error[:3])))
     folder.mkdir()
-    write_tum(folder / "eskf.tum", Trajectory(utime, Poses(np.array(position), np.array(quaternion))))
+    estimated = Poses(np.array(position), np.array(quaternion))
+    if began is not None:
+        estimated = began[np.zeros(count, dtype=int)] @ estimated
+        turn = np.eye(6)
+        turn[3:, 3:] = rotation_matrix(began.quaternion)[0]
+        covariance = turn @ covariance @ turn.T
+    write_tum(folder / "eskf.tum", Trajectory(utime, estimated))
     upper = covariance[np.triu_indices(6)]
     names = [f"p{i}{k}" for i, k in zip(*np.triu_indices(6), strict=True)]
     rows = [",".join(map(str, [t, *upper])) for t in utime]
@@ -59,6 +66,13 @@ def test_nees_is_the_square_of_how_much_larger_the_errors_are(tmp_path: Path) ->
     position, attitude = nees_of(tmp_path / "a", _replay(tmp_path / "a", 1, 3.0))
     assert position == pytest.approx(9.0, rel=0.2)
     assert attitude == pytest.approx(9.0, rel=0.25)
+
+
+def test_a_vehicle_that_has_left_the_origin_by_its_first_pose_is_as_honest_as_one_that_has_not(tmp_path: Path) -> None:
+    turn = quaternion_from_matrix(_rotation(np.array([0.0, 0.3, 0.0])))[None]
+    began = Poses(np.array([[0.1, 0.0, -0.5]]), turn)
+    moving = nees_of(tmp_path / "a", _replay(tmp_path / "a", 1, 1.0, began))
+    assert moving == pytest.approx(nees_of(tmp_path / "b", _replay(tmp_path / "b", 1, 1.0)), rel=1e-3)
 
 
 def test_few_poses_lie_outside_three_sigma_of_an_honest_covariance(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ BAND = 0.95
 SIGMAS = 3.0  # within which an honest pose nearly always lies, in each coordinate
 SILENT_M = 0.5  # a pose that is farther off and reported as OK
 _OK = 0
+_LEFT_M, _LEFT_RAD = 0.02, 0.01
 
 
 def band(degrees: int) -> tuple[float, float]:
@@ -75,9 +76,15 @@ def _pose_errors(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory
     reference is level and has its origin and heading at the first pose, so the tilt of the start is an error."""
     pair = paired(estimate, truth)
     covariance = covariance[np.isin(estimate.utime, pair.estimate.utime)]
-    true = _level_start(pair.truth.poses[:1]).inverse()[np.zeros(len(covariance), dtype=int)] @ pair.truth.poses
-    shift = true.position - pair.estimate.poses.position
-    R_estimate = rotation_matrix(pair.estimate.poses.quaternion)
+    true, estimated = _from(_level_start(pair.truth.poses[:1]), pair.truth.poses), pair.estimate.poses
+    start = _level_start(estimated[:1])
+    if _begins_in_motion(start):
+        estimated = _from(start, estimated)
+        turn_of_axes = np.eye(6)
+        turn_of_axes[3:, 3:] = rotation_matrix(start.quaternion)[0]
+        covariance = turn_of_axes.T @ covariance @ turn_of_axes
+    shift = true.position - estimated.position
+    R_estimate = rotation_matrix(estimated.quaternion)
     R_error = np.einsum("nji,njk->nik", R_estimate, rotation_matrix(true.quaternion))
     # The errors are fractions of a degree or the pose is lost anyhow: the skew part is the rotation vector.
     turn = 0.5 * np.stack(
@@ -85,6 +92,17 @@ def _pose_errors(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory
         axis=1,
     )
     return np.hstack([turn, shift]), covariance
+
+
+def _from(frame: Poses, poses: Poses) -> Poses:
+    return frame.inverse()[np.zeros(len(poses), dtype=int)] @ poses
+
+
+def _begins_in_motion(first: Poses) -> bool:
+    """It has left the origin of frame odom, or its heading, by the first scan. One that stands is off by what that scan
+    erred, and that is an error."""
+    turn = 2.0 * np.abs(first.quaternion[0, 2])
+    return bool(np.linalg.norm(first.position[0]) > _LEFT_M or turn > _LEFT_RAD)
 
 
 def _level_start(first: Poses) -> Poses:
