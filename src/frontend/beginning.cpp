@@ -46,8 +46,12 @@ void Lio::start(const FilterState& first) {
 /// and no start is made until it tells.
 void Lio::start_moving(const FilterState& first) {
   const Utime now = first.nominal.utime;
-  if (!config_.use_scan_matching || !start_motion_.is_needed()) {
+  if (!config_.use_scan_matching || start_motion_.has_dense_scans()) {
     start(first);
+    return;
+  }
+  if (!start_motion_.has_scans()) {
+    start_finding_ = "waiting for the first scan";
     return;
   }
   if (last_asked_ && now - *last_asked_ < kAskingPeriodUs) return;

@@ -75,8 +75,8 @@ void Lio::reset() {
 LioStatus Lio::status() const {
   LioStatus status;
   status.running = running_;
-  const bool is_refused_by_scans = !running_ && last_asked_;
-  status.text = is_refused_by_scans ? start_finding_ : initialisation_.report();
+  const bool waits_for_scans = !running_ && !start_finding_.empty();
+  status.text = waits_for_scans ? start_finding_ : initialisation_.report();
   if (running_ && !start_finding_.empty()) status.text += "; " + start_finding_;
   status.trust = running_ ? trust_.trust() : Trust::kDegraded;
   status.reason = running_ ? trust_.reason() : start_note_.empty() ? status.text : start_note_ + "; " + status.text;

@@ -114,7 +114,7 @@ void StartMotion::add(const Scan& scan) {
   while (seconds_between(scans_.front().end_utime(), scan.end_utime()) > kWindowSeconds) scans_.pop_front();
 }
 
-bool StartMotion::is_needed() const { return !scans_.empty() && newest_points_ < kPointsThatSuffice; }
+bool StartMotion::has_dense_scans() const { return newest_points_ >= kPointsThatSuffice; }
 
 /// Fills measured_ with the points as they are.
 void StartMotion::measure() {

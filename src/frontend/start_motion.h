@@ -51,8 +51,11 @@ class StartMotion {
   /// The next scan, in time order. What is older than the window is forgotten.
   void add(const Scan& scan);
 
-  /// The newest scan alone is too sparse to be laid on the next one, so the speed has to come from here.
-  [[nodiscard]] bool is_needed() const;
+  [[nodiscard]] bool has_scans() const { return !scans_.empty(); }
+
+  /// The newest scan has points enough to be laid on the next one, whatever the speed. Otherwise it has to come from
+  /// here.
+  [[nodiscard]] bool has_dense_scans() const;
 
   /// End of the newest scan, of which there must be one.
   [[nodiscard]] Utime newest() const { return scans_.back().end_utime(); }

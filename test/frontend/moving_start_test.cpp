@@ -92,6 +92,19 @@ TEST(MovingStart, WaitsAndSaysWhyWhereScansDoNotTellTheSpeed) {
   EXPECT_EQ(test::count(run, ScanReason::kNotInitialised), static_cast<int>(run.scans.size()));
 }
 
+TEST(MovingStart, WaitsForALiDARThatHasToSpinUp) {
+  Drive drive = test::simulate(test::furnished_hall(), braking_curve, 8.0, Sensors{}, 8);
+  std::erase_if(drive.scans, [&](const Scan& scan) { return scan.utime < drive.imu.front().utime + to_micros(3.0); });
+  Lio early(moving_config());
+  for (const ImuSample& sample : drive.imu) {
+    if (test::drive_seconds(drive, sample.utime) < 2.5) (void)early.add_imu(sample);
+  }
+  EXPECT_EQ(early.status().text, "waiting for the first scan");
+  const LioRun run = run_lio(moving_config(), drive);
+  ASSERT_TRUE(run.status.running) << run.status.text;
+  EXPECT_LT(test::aligned_error(run, drive), 0.02);
+}
+
 TEST(MovingStart, AVehicleThatStandsBeginsAsOneThatStands) {
   const Drive drive = test::simulate(test::furnished_hall(), test::straight_drive(4.0, 1.0), 8.0, Sensors{}, 6);
   const LioRun run = run_lio(moving_config(), drive);
