@@ -58,9 +58,9 @@ def table(outcomes: list[Outcome]) -> str:
     for scene in dict.fromkeys(outcome.drive.scene for outcome in outcomes):
         here = [outcome for outcome in outcomes if outcome.drive.scene == scene]
         seeds = len({outcome.drive.seed for outcome in here})
-        drawn = f"{seeds} seed{'s' if seeds > 1 else ''}" if here[0].drive.seed else "recording"
+        drawn = "recording" if here[0].drive.seed is None else f"{seeds} seed{'s' if seeds > 1 else ''}"
         lines += [f"### {scene} ({drawn})", ""]
-        columns = [each for each in _COLUMNS if any(each[0] in outcome.figures for outcome in here)]
+        columns = [each for each in _COLUMNS if any(each[0] in outcome.figures for outcome in here)] or [_COLUMNS[0]]
         titles = [title for _, title, _ in columns]
         lines += ["| system | " + " | ".join(titles) + " | ATE / best peer | CPU / fastest peer |"]
         lines += ["|---" * (len(columns) + 3) + "|"]
@@ -217,6 +217,10 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--out", type=Path, default=Path("results/bench"))
     parsed = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    if parsed.recording and (parsed.scenes or parsed.quick):
+        parser.error("--recording takes the place of --scenes and --quick")
+    if parsed.gt and not parsed.recording:
+        parser.error("--gt belongs to a --recording")
     parsed.scenes = parsed.scenes or list(_QUICK_SCENES if parsed.quick else _SCENES)
     return run_command(lambda: bench(parsed))
 

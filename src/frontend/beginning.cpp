@@ -50,22 +50,23 @@ void Lio::start_moving(const FilterState& first) {
     start(first);
     return;
   }
-  if (!start_motion_.has_scans()) {
-    start_finding_ = "waiting for the first scan";
+  if (!start_motion_.has_window_until(now) || start_motion_.newest() < imu_.samples().front().utime) {
+    start_finding_ = "waiting for a second of scans";
     return;
   }
+  start_finding_ = "start refused, waiting: scans do not tell how fast it goes";
   if (last_asked_ && now - *last_asked_ < kAskingPeriodUs) return;
   last_asked_ = now;
   const std::optional<BentMotion> motion = start_motion_.find_beside(first.nominal, imu_.samples(), config_.gravity_m);
-  start_finding_ = motion ? describe(*motion) : "start refused, waiting: scans do not tell how fast it goes";
   if (!motion) return;
+  start_finding_ = describe(*motion);
   FilterState found = moving_state(config_, first.nominal, *motion);
   found.nominal.utime = start_motion_.newest();
   start_motion_.fill(map_, *motion, found.nominal.T_odom_body);
   start(found);
   velocity_known_ = true;
   mapped_velocity_variance_ = velocity_variance(filter_.covariance);
-  trust_.note_uncertain_start(start_finding_, kScansToConfirmMotion);
+  if (start_note_.empty()) trust_.note_uncertain_start(start_finding_, kScansToConfirmMotion);
   rebuild_live_state();
 }
 

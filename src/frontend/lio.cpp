@@ -75,12 +75,17 @@ void Lio::reset() {
 LioStatus Lio::status() const {
   LioStatus status;
   status.running = running_;
-  const bool waits_for_scans = !running_ && !start_finding_.empty();
-  status.text = waits_for_scans ? start_finding_ : initialisation_.report();
-  if (running_ && !start_finding_.empty()) status.text += "; " + start_finding_;
+  status.text = start_text();
   status.trust = running_ ? trust_.trust() : Trust::kDegraded;
   status.reason = running_ ? trust_.reason() : start_note_.empty() ? status.text : start_note_ + "; " + status.text;
   return status;
+}
+
+/// A start in motion that the scans were asked about is theirs to tell: the IMU knows no velocity.
+std::string Lio::start_text() const {
+  if (start_finding_.empty()) return initialisation_.report();
+  if (config_.start == "moving") return running_ ? "started moving: " + start_finding_ : start_finding_;
+  return initialisation_.report() + "; " + start_finding_;
 }
 
 ImuResult Lio::add_imu(const ImuSample& sample) {
@@ -105,6 +110,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     live_.utime = sample.utime;
   } else if (!running_) {
     if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
+    start_finding_.clear();
     if (const std::optional<FilterState> first = initialisation_.add(sample)) {
       config_.start == "moving" ? start_moving(*first) : start(*first);
     }

@@ -115,6 +115,7 @@ class Lio {
   void advance_to(Utime utime);
   void start(const FilterState& first);
   void start_moving(const FilterState& first);
+  [[nodiscard]] std::string start_text() const;
   void ask_scans_for_motion();
   void give_up_resumption();
   void close_gap(Utime first_sample);

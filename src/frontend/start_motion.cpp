@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <format>
 #include <functional>
 #include <span>
 #include <utility>
@@ -11,17 +10,17 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "common/frames.h"
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
 #include "frontend/deskew.h"
-#include "frontend/imu_initialisation.h"
 
 namespace ignis {
 namespace {
 
 constexpr double kWindowSeconds = 0.8;  // an L1 has then looked everywhere eight times
 constexpr std::size_t kLeastScans = 4;
+constexpr double kFreshSeconds = 0.2;             // at the ends of the window; older scans say nothing of now
+constexpr int kUntimedScanUs = 100'000;           // of a scan whose points have no times of their own
 constexpr double kMostPoints = 22'000;            // of scans that take a second: all of an L1
 constexpr std::size_t kPointsThatSuffice = 5000;  // in a scan, to be laid on the next one whatever the speed
 // Speeds that are tried [m/s], forward. Gauss-Newton finds to the true one from a step away.
@@ -57,26 +56,30 @@ constexpr double kLeastFacing = 3.5;
 // Of the time over which all scans are spread about such a point, squared, how much lies beside it at rest. 0.003 to
 // 0.27 for true speeds from 0.2 m/s on, 0.54 to 1.07 for wrong ones and in corridors.
 constexpr double kMostThatRestExplains = 0.4;
-constexpr double kMeeting = 0.2;         // [m/s] between searches that led to the same speed
-constexpr double kSameSpeed = 0.3;       // [m/s] and that are on their way there
-constexpr double kStandingSpeed = 0.03;  // [m/s] scans of a vehicle that stands make up to 0.015
-constexpr double kStandingTurn = 0.006;  // [rad/s] and 0.003
-constexpr double kSpeedSigma = 0.03;     // [m/s] of what is found, beside what the points' noise makes
-constexpr double kTurnSigma = 0.003;     // [rad/s]
-// The same where the motion bends: of 40 starts in motion the speed was off by 0.05 m/s, the tilt by 0.95 degrees
+constexpr double kMeeting = 0.2;      // [m/s] between searches that led to the same speed
+constexpr double kSameSpeed = 0.3;    // [m/s] and that are on their way there
+constexpr double kSpeedSigma = 0.03;  // [m/s] of what is found, beside what the points' noise makes
+constexpr double kTurnSigma = 0.003;  // [rad/s]
+// The same where the motion bends: of 53 starts in motion the speed was off by 0.05 m/s, the tilt by 1.0 degrees
 // (rms).
+constexpr double kBentStandingSpeed = 0.1;  // [m/s] scans of a vehicle that stands make up to 0.06
 constexpr double kBentSpeedSigma = 0.05;    // [m/s]
 constexpr double kAccelerationSigma = 0.1;  // [m/s^2] with the accelerometer's bias 0.7 degrees of tilt per axis
 
 using Motion9 = Eigen::Matrix<double, 9, 1>;
 
-/// Where a point of an earlier instant lies now: the motion is constant in body axes.
-Eigen::Vector3d carried(const Motion9& motion, double seconds, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d turn = motion.head<3>();
-  const Eigen::Vector3d velocity = motion.segment<3>(3);
-  const Eigen::Vector3d acceleration = motion.tail<3>();
-  return so3::rotate_a_little(turn * seconds, point) +
-         seconds * (velocity + 0.5 * seconds * (turn.cross(velocity) + acceleration));
+/// Where a point of an earlier instant lies now, if the motion is constant in body axes.
+Eigen::Vector3d carried(const Vector6d& twist, double seconds, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d turn = twist.head<3>();
+  const Eigen::Vector3d velocity = twist.tail<3>();
+  return so3::rotate_a_little(turn * seconds, point) + seconds * (velocity + 0.5 * seconds * turn.cross(velocity));
+}
+
+/// The same beside the inertial unit, which has turned point and axes already but for the gyro's bias: velocity and
+/// acceleration are those of the newest instant's axes.
+Eigen::Vector3d carried_beside(const Motion9& motion, double seconds, const Eigen::Vector3d& point) {
+  return so3::rotate_a_little(motion.head<3>() * seconds, point) +
+         seconds * (motion.segment<3>(3) + 0.5 * seconds * motion.tail<3>());
 }
 
 double forward_speed(const Motion9& motion) { return -motion[5]; }
@@ -95,17 +98,14 @@ Motion9 without_acceleration(const Vector6d& twist) {
 
 }  // namespace
 
-bool SteadyMotion::is_rolling() const {
-  return twist.tail<3>().norm() > kStandingSpeed || twist.head<3>().norm() > kStandingTurn;
-}
-
 StartMotion::StartMotion(const FrontendConfig& config)
     : config_(config), selector_(config), finder_(config), map_(config) {}
 
 void StartMotion::add(const Scan& scan) {
   newest_points_ = scan.points.size();
   Scan& kept = scans_.emplace_back(selector_.select(scan).scan);
-  const auto most = static_cast<std::size_t>(kMostPoints * 1e-6 * static_cast<double>(kept.duration_us));
+  const double seconds = 1e-6 * static_cast<double>(kept.duration_us > 0 ? kept.duration_us : kUntimedScanUs);
+  const auto most = static_cast<std::size_t>(kMostPoints * seconds);
   const std::size_t all = kept.points.size();
   if (all > most) {
     for (std::size_t i = 0; i < most; ++i) kept.points[i] = kept.points[i * all / most];
@@ -115,6 +115,11 @@ void StartMotion::add(const Scan& scan) {
 }
 
 bool StartMotion::has_dense_scans() const { return newest_points_ >= kPointsThatSuffice; }
+
+bool StartMotion::has_window_until(Utime now) const {
+  return scans_.size() >= kLeastScans && seconds_between(newest(), now) < kFreshSeconds &&
+         seconds_between(scans_.front().utime, newest()) > kWindowSeconds - kFreshSeconds;
+}
 
 /// Fills measured_ with the points as they are.
 void StartMotion::measure() {
@@ -135,7 +140,9 @@ void StartMotion::place(const Motion& motion) {
   for (const Scan& scan : scans_) {
     placed.clear();
     for (std::size_t i = 0; i < scan.points.size(); ++i, ++next) {
-      samples_.push_back({carried(motion, next->seconds, next->point), next->seconds});
+      const Eigen::Vector3d point = bends_ ? carried_beside(motion, next->seconds, next->point)
+                                           : carried(motion.head<6>(), next->seconds, next->point);
+      samples_.push_back({point, next->seconds});
       placed.push_back(samples_.back().point.cast<float>());
     }
     map_.insert(std::span<const Eigen::Vector3f>(placed), Pose{}, true);
@@ -163,6 +170,7 @@ StartMotion::Look StartMotion::look(const Motion& motion, std::size_t stride) {
       Eigen::Vector3d::Constant(config_.moving_accel_sigma);
   MotionMatrix information = prior_sigma.array().square().inverse().matrix().asDiagonal();
   Motion gradient = Motion::Zero();
+  if (bends_) gradient.tail<3>() = -information.bottomRightCorner<3, 3>() * motion.tail<3>();
   double facing = 0.0;
   std::vector<std::size_t> witnesses;
   double roughness = 0.0;  // [m^2] sum of variances
@@ -230,11 +238,16 @@ SteadyMotion StartMotion::told(const Candidate& found) {
   return motion;
 }
 
+/// Beside the inertial unit a turn is none, but the gyro's bias.
+bool StartMotion::is_rolling(const Candidate& found) const {
+  return bends_ ? found.motion.segment<3>(3).norm() > kBentStandingSpeed : told(found).is_rolling();
+}
+
 /// Nothing where it is not plain that it stood.
 std::optional<StartMotion::Candidate> StartMotion::find_rest() {
   const std::size_t stride = stride_to(kPointsAtRest);
   const Candidate rest = refined(Motion::Zero(), kPasses, stride, stride);
-  if (told(rest).is_rolling()) return std::nullopt;
+  if (is_rolling(rest)) return std::nullopt;
   for (double speed = kSlowest; speed <= kFastest; speed += kSpeedStepAtRest) {
     const bool is_other = std::abs(speed) > 0.5 * kSpeedStepAtRest;
     if (is_other && rest.last.evidence < kDecisiveAtRest * look(at_speed(speed), stride).evidence) return std::nullopt;
@@ -274,17 +287,19 @@ std::optional<BentMotion> StartMotion::find_beside(const NavState& standing, std
   all.duration_us = static_cast<std::int32_t>(newest() - all.utime);
   for (const Scan& scan : scans_) {
     for (const ScanPoint& point : scan.points) {
-      const auto dt_us = static_cast<std::int32_t>(scan.utime - all.utime) + point.dt_us;
+      const auto dt_us =
+          static_cast<std::int32_t>(scan.utime - all.utime) + std::clamp(point.dt_us, 0, scan.duration_us);
       all.points.push_back({point.position, point.intensity, dt_us});
     }
   }
   const std::vector<CloudPoint> moved = deskew(all, standing, samples, gravity_m);
   for (std::size_t i = 0; i < moved.size(); ++i) measured_[i].point = moved[i].position.cast<double>();
   bends_ = true;
-  const std::optional<Candidate> bent = search();
+  std::optional<Candidate> bent = search();
+  if (bent) bent = refined(bent->motion, kFinalBentPasses, stride_to(kConvergingPoints), 1);
   bends_ = false;
   if (!bent) return std::nullopt;
-  const double variance = bent->last.covariance.diagonal().tail<3>().mean();
+  const double variance = bent->last.covariance.diagonal().tail<3>().maxCoeff();
   BentMotion found{.steady = told(*bent),
                    .acceleration = bent->motion.tail<3>(),
                    .acceleration_sigma = std::sqrt(variance + kAccelerationSigma * kAccelerationSigma)};
@@ -316,8 +331,7 @@ std::optional<StartMotion::Candidate> StartMotion::search() {
     return is_near(other, kSameSpeed) || evidence(best) > decisive * evidence(other);
   });
   if (!is_decisive) return std::nullopt;
-  const bool is_mirage =
-      told(best).is_rolling() && (best.last.facing < kLeastFacing || rest_explains(best.last.witnesses));
+  const bool is_mirage = is_rolling(best) && (best.last.facing < kLeastFacing || rest_explains(best.last.witnesses));
   return is_mirage ? std::nullopt : std::optional(best);
 }
 
@@ -334,7 +348,8 @@ void StartMotion::fill_placed(LocalMap& map, const Pose& T_odom_newest) const {
 void StartMotion::fill(LocalMap& map, const SteadyMotion& motion, Utime now, const Pose& T_odom_body) {
   const double seconds = seconds_between(now, newest());
   const Motion twist = without_acceleration(motion.twist);
-  const Pose T_now_newest{so3::exp(twist.head<3>() * seconds), carried(twist, seconds, Eigen::Vector3d::Zero())};
+  const Pose T_now_newest{so3::exp(motion.twist.head<3>() * seconds),
+                          carried(motion.twist, seconds, Eigen::Vector3d::Zero())};
   place(twist);
   fill_placed(map, T_odom_body * T_now_newest);
 }
@@ -342,46 +357,10 @@ void StartMotion::fill(LocalMap& map, const SteadyMotion& motion, Utime now, con
 void StartMotion::fill(LocalMap& map, const BentMotion& motion, const Pose& T_odom_body) {
   Motion all;
   all << motion.steady.twist, motion.acceleration;
+  bends_ = true;
   place(all);
+  bends_ = false;
   fill_placed(map, T_odom_body);
-}
-
-void set_rolling(FilterState& first, const SteadyMotion& motion, double gravity_m) {
-  const Eigen::Matrix3d R = first.nominal.T_odom_body.rotation.toRotationMatrix();
-  const Eigen::Vector3d turn = motion.twist.head<3>();
-  const Eigen::Vector3d velocity = motion.twist.tail<3>();
-  first.nominal.gyro_bias -= turn;
-  first.nominal.angular_rate += turn;
-  first.nominal.v_odom = R * velocity;
-  first.covariance.block<3, 3>(kGyroBias, kGyroBias) += motion.covariance.topLeftCorner<3, 3>();
-  first.covariance.block<3, 3>(kVelocity, kVelocity) = R * motion.covariance.bottomRightCorner<3, 3>() * R.transpose();
-  const double tilt = turn.cross(velocity).norm() / gravity_m;
-  first.covariance.diagonal().segment<2>(kGravityTilt).array() += tilt * tilt;
-}
-
-FilterState moving_state(const FrontendConfig& config, const NavState& standing, const BentMotion& motion) {
-  const Eigen::Vector3d up_body = standing.T_odom_body.rotation.conjugate() * frames::up();
-  const Eigen::Vector3d up_force = config.gravity_m * up_body - motion.acceleration;
-  const double variance = motion.acceleration_sigma * motion.acceleration_sigma;
-  FilterState first = moving_state(config, up_force, variance);
-  const Eigen::Matrix3d R = first.nominal.T_odom_body.rotation.toRotationMatrix();
-  const Matrix6d& covariance = motion.steady.covariance;
-  first.nominal.gyro_bias = -motion.steady.twist.head<3>();
-  first.nominal.angular_rate = standing.angular_rate - first.nominal.gyro_bias;
-  first.nominal.v_odom = R * motion.steady.twist.tail<3>();
-  first.covariance.block<3, 3>(kGyroBias, kGyroBias) = covariance.topLeftCorner<3, 3>();
-  first.covariance.block<3, 3>(kVelocity, kVelocity) = R * covariance.bottomRightCorner<3, 3>() * R.transpose();
-  return first;
-}
-
-std::string describe(const BentMotion& motion) {
-  return std::format("scans say that it moves: forward at {:.2f} m/s", -motion.steady.twist[5]);
-}
-
-std::string describe(const SteadyMotion& motion) {
-  if (!motion.is_rolling()) return "scans agree that it stood";
-  return std::format("scans say that it was moving: forward at {:.2f} m/s, turning at {:.3f} rad/s", -motion.twist[5],
-                     motion.twist.head<3>().norm());
 }
 
 }  // namespace ignis

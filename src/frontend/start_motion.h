@@ -4,36 +4,19 @@
 #include <deque>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "common/measurements.h"
 #include "common/pose.h"
-#include "frontend/eskf.h"
 #include "frontend/frontend_config.h"
 #include "frontend/local_map.h"
 #include "frontend/plane_finder.h"
 #include "frontend/scan_selection.h"
+#include "frontend/start_state.h"
 
 namespace ignis {
-
-/// Turn rate [rad/s] and velocity [m/s] of a vehicle that keeps both, in body axes.
-struct SteadyMotion {
-  Vector6d twist = Vector6d::Zero();
-  Matrix6d covariance = Matrix6d::Identity();
-
-  /// False where it is too slow to be told from standing.
-  [[nodiscard]] bool is_rolling() const;
-};
-
-/// Motion of a vehicle that keeps neither, at the newest instant, beside what the inertial unit says of it.
-struct BentMotion {
-  SteadyMotion steady;                                     ///< velocity then, and the turn rate that the gyro misses
-  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< [m/s^2] body axes, that a tilt of the start hides
-  double acceleration_sigma = 0.0;                         ///< [m/s^2] per axis
-};
 
 /// Did the vehicle stand before the start, or roll? To the IMU a constant speed is rest, so the last scans are asked.
 ///
@@ -51,11 +34,12 @@ class StartMotion {
   /// The next scan, in time order. What is older than the window is forgotten.
   void add(const Scan& scan);
 
-  [[nodiscard]] bool has_scans() const { return !scans_.empty(); }
-
-  /// The newest scan has points enough to be laid on the next one, whatever the speed. Otherwise it has to come from
+  /// The newest scan has points enough to be laid on the next one, whatever the speed. Otherwise that has to come from
   /// here.
   [[nodiscard]] bool has_dense_scans() const;
+
+  /// There are scans of all of the window, and they are those of the time until `now`.
+  [[nodiscard]] bool has_window_until(Utime now) const;
 
   /// End of the newest scan, of which there must be one.
   [[nodiscard]] Utime newest() const { return scans_.back().end_utime(); }
@@ -66,18 +50,18 @@ class StartMotion {
 
   /// The same for a vehicle that does not keep its motion: what the inertial unit says of turns and accelerations is
   /// taken out first. `standing` is the state at that end with no velocity, in an attitude that is off by what the
-  /// acceleration makes of it.
+  /// acceleration makes of it. gravity_m: [m/s^2].
   [[nodiscard]] std::optional<BentMotion> find_beside(const NavState& standing, std::span<const ImuSample> samples,
                                                       double gravity_m);
 
-  /// Puts the scans into an empty map, for a vehicle that is at `T_odom_body` now.
+  /// Puts the scans that find() was asked about into an empty map, for a vehicle that is at `T_odom_body` now.
   void fill(LocalMap& map, const SteadyMotion& motion, Utime now, const Pose& T_odom_body);
 
   /// The same at the newest instant, after find_beside().
   void fill(LocalMap& map, const BentMotion& motion, const Pose& T_odom_body);
 
  private:
-  using Motion = Eigen::Matrix<double, 9, 1>;  ///< turn rate, velocity, acceleration
+  using Motion = Eigen::Matrix<double, 9, 1>;  ///< turn rate, velocity, acceleration (zero unless bends_)
   using MotionMatrix = Eigen::Matrix<double, 9, 9>;
 
   struct Sample {
@@ -106,6 +90,7 @@ class StartMotion {
   [[nodiscard]] Candidate refined(Motion motion, int passes, std::size_t stride, std::size_t last_stride);
   [[nodiscard]] std::optional<Candidate> find_rest();
   [[nodiscard]] static SteadyMotion told(const Candidate& found);
+  [[nodiscard]] bool is_rolling(const Candidate& found) const;
   [[nodiscard]] bool rest_explains(std::span<const std::size_t> witnesses);
 
   FrontendConfig config_;
@@ -113,23 +98,11 @@ class StartMotion {
   PlaneFinder finder_;
   LocalMap map_;
   std::deque<Scan> scans_;
-  bool bends_ = false;             ///< acceleration is looked for as well
+  bool bends_ = false;             ///< the motion is that beside the inertial unit, and has an acceleration
   std::size_t newest_points_ = 0;  ///< of the newest scan as the sensor gave it
   std::vector<Sample> measured_;   ///< all points of scans_, as if nothing had moved but what the inertial unit told
   std::vector<Sample> samples_;
   std::vector<Eigen::Vector3d> queries_;
 };
-
-/// A first state that was found as if at rest, for a vehicle that rolls: what the gyro read was turn and bias, and the
-/// mean specific force held what turning at speed feels.
-void set_rolling(FilterState& first, const SteadyMotion& motion, double gravity_m);
-
-/// A vehicle in motion at the newest instant: `standing` has the attitude that the scans were asked with.
-[[nodiscard]] FilterState moving_state(const FrontendConfig& config, const NavState& standing,
-                                       const BentMotion& motion);
-
-/// For people.
-[[nodiscard]] std::string describe(const SteadyMotion& motion);
-[[nodiscard]] std::string describe(const BentMotion& motion);
 
 }  // namespace ignis

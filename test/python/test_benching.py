@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ignis.bench import table
-from ignis.benching import peer_runner
+from ignis.bench import main, table
+from ignis.benching import peer_runner, systems
 from ignis.benching.inputs import Drive, recorded_drive, sensor_of
 from ignis.benching.systems import CPU_LIMIT_S, Outcome, _judged, _run_on, failure_reason
+from ignis.errors import InputError
 from ignis.importers.recorder import Recorder
 from ignis.mounts import Extrinsics
 from ignis.poses import Poses, Trajectory, read_tum
@@ -100,7 +101,7 @@ def config_file(folder: Path, start: str) -> Path:
 def test_a_recording_comes_with_its_truth_its_sensor_and_its_start(tmp_path: Path) -> None:
     log = recording(tmp_path / "around_the_block.lcm", 500, truth=True)
     drive = recorded_drive(log, config_file(tmp_path, "at_rest"), None, "auto", tmp_path / "inputs")
-    assert (drive.scene, drive.sensor, drive.log) == ("around_the_block", "l1", log)
+    assert (drive.scene, drive.sensor, drive.seed, drive.log) == ("around_the_block.lcm", "l1", None, log)
     assert drive.rest_s == peer_runner.REST_S
     assert drive.truth is not None and read_tum(drive.truth).poses.position[2].tolist() == [0.0, 0.0, -2.0]
     with np.load(drive.arrays) as arrays:
@@ -124,9 +125,39 @@ def test_truth_from_elsewhere_wins_and_is_turned_into_our_axes(tmp_path: Path) -
     assert read_tum(drive.truth).poses.position[2].tolist() == pytest.approx([0.0, 0.0, -6.0])
 
 
+def test_a_recording_among_the_inputs_is_not_thrown_away(tmp_path: Path) -> None:
+    inputs = tmp_path / "inputs"
+    (inputs / "recordings" / "street.lcm").mkdir(parents=True)
+    log = recording(inputs / "recordings" / "street.lcm" / "street.lcm", 500, truth=True)
+    config = config_file(tmp_path, "at_rest")
+    with pytest.raises(InputError, match="another --out"):
+        recorded_drive(inputs / "recordings" / "street.lcm", config, None, "auto", inputs)
+    assert log.is_file()
+
+
+@pytest.mark.parametrize("arguments", [["--gt", "a.tum"], ["--recording", "a.lcm", "--quick"]])
+def test_options_that_contradict_one_another_are_refused(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as refused:
+        main(arguments)
+    assert refused.value.code == 2
+
+
+def test_the_peers_process_is_told_how_long_the_rest_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    commands: list[list[object]] = []
+
+    def run_on(command: list[object], core: int) -> tuple[str, dict[str, float]]:
+        commands.append(command)
+        return "not run", {}
+
+    monkeypatch.setattr(systems, "_run_on", run_on)
+    drive = Drive("street", "spinning", None, Path(), tmp_path / "a.npz", None, 0.0)
+    assert systems.run_peer(Path("python"), "kiss-icp", drive, tmp_path, 0).figures == {"failed": "not run"}
+    assert commands[0][-2:] == ["--rest", 0.0]
+
+
 def test_without_truth_the_way_from_the_end_back_to_the_start_is_told() -> None:
     trajectory = Trajectory(np.arange(3), Poses(np.array([[0, 0, 0], [9, 9, 9], [3, 4, 0.0]]), np.eye(4)[[0, 0, 0]]))
-    drive = Drive("loop", "l1", 0, Path(), Path(), None)
+    drive = Drive("loop", "l1", None, Path(), Path(), None)
     judged = _judged("ours: ESKF", drive, trajectory, {"cpu_s": 1.0})
     assert judged.figures == {"end_to_start_m": 5.0, "cpu_s": 1.0}
     header = table([judged]).splitlines()[2]

@@ -13,6 +13,7 @@ import numpy as np
 
 from ignis.benching.peer_runner import REST_S
 from ignis.comparing.estimates import read_in_our_axes
+from ignis.errors import InputError
 from ignis.evaluation.drives import simulate
 from ignis.importers.recorder import IMU_CHANNEL, SCAN_CHANNEL, TRUTH_CHANNEL
 from ignis.importing import ImportChoice, detect, import_recording
@@ -21,7 +22,7 @@ from ignis.mounts import R_OURS_FROM_FLU, effective_config
 from ignis.poses import Trajectory, make_trajectory, write_tum
 
 # Scans of fewer points are taken for those of an L1, which peers get several at a time.
-_SPARSE_SCAN_POINTS = 4000
+_SPARSE_SCAN_POINTS = 5000
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Drive:
 
     scene: str  # or the recording's name
     sensor: str  # "l1" or "spinning"
-    seed: int
+    seed: int | None  # of a recording there is none
     log: Path
     arrays: Path
     truth: Path | None  # in our axes
@@ -57,7 +58,9 @@ def make_drive(l1_sim: Path, scene: Path, seed: int, config: Path, folder: Path)
 def recorded_drive(source: Path, config: Path, gt: Path | None, gt_axes: str, folder: Path) -> Drive:
     """A recording of any kind that `./ignis import` reads, or an LCM log, with the truth in it or that of `gt`. What an
     earlier run left there may be of another recording or configuration, so all is made anew."""
-    out = folder / source.resolve().name.split(".")[0]
+    out = folder / "recordings" / source.resolve().name
+    if source.resolve().is_relative_to(out.resolve()):
+        raise InputError(f"{source} lies where the bench keeps its inputs; give another --out")
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     log, arrays, truth_file = out / "drive.lcm", out / "drive.npz", out / "ground_truth.tum"
@@ -72,7 +75,7 @@ def recorded_drive(source: Path, config: Path, gt: Path | None, gt_axes: str, fo
     sensor = "l1" if points_per_scan < _SPARSE_SCAN_POINTS else "spinning"
     starts_moving = effective_config(config).get("frontend", {}).get("start") == "moving"
     rest_s = 0.0 if starts_moving else REST_S
-    return Drive(out.name, sensor, 0, log, arrays, None if truth is None else truth_file, rest_s)
+    return Drive(out.name, sensor, None, log, arrays, None if truth is None else truth_file, rest_s)
 
 
 def _recorded_truth(log: Path) -> Trajectory | None:

@@ -17,7 +17,7 @@ BAND = 0.95
 SIGMAS = 3.0  # within which an honest pose nearly always lies, in each coordinate
 SILENT_M = 0.5  # a pose that is farther off and reported as OK
 _OK = 0
-_LEFT_M, _LEFT_RAD = 0.02, 0.01
+_STANDING_M_S, _STANDING_RAD_S = 0.1, 0.02
 
 
 def band(degrees: int) -> tuple[float, float]:
@@ -77,8 +77,8 @@ def _pose_errors(estimate: Trajectory, covariance: np.ndarray, truth: Trajectory
     pair = paired(estimate, truth)
     covariance = covariance[np.isin(estimate.utime, pair.estimate.utime)]
     true, estimated = _from(_level_start(pair.truth.poses[:1]), pair.truth.poses), pair.estimate.poses
-    start = _level_start(estimated[:1])
-    if _begins_in_motion(start):
+    if _begins_in_motion(pair.truth):
+        start = _level_start(estimated[:1])
         estimated = _from(start, estimated)
         turn_of_axes = np.eye(6)
         turn_of_axes[3:, 3:] = rotation_matrix(start.quaternion)[0]
@@ -98,11 +98,12 @@ def _from(frame: Poses, poses: Poses) -> Poses:
     return frame.inverse()[np.zeros(len(poses), dtype=int)] @ poses
 
 
-def _begins_in_motion(first: Poses) -> bool:
-    """It has left the origin of frame odom, or its heading, by the first scan. One that stands is off by what that scan
-    erred, and that is an error."""
-    turn = 2.0 * np.abs(first.quaternion[0, 2])
-    return bool(np.linalg.norm(first.position[0]) > _LEFT_M or turn > _LEFT_RAD)
+def _begins_in_motion(truth: Trajectory) -> bool:
+    """Then it has left the origin of frame odom by the first scan. One that stands is off by what that scan erred."""
+    seconds = 1e-6 * float(truth.utime[1] - truth.utime[0])
+    step = (truth.poses[:1].inverse() @ truth.poses[1:2]).position[0]
+    turn = 2.0 * (truth.poses[:1].inverse() @ truth.poses[1:2]).quaternion[0, 1:]
+    return bool(np.linalg.norm(step) > _STANDING_M_S * seconds or np.linalg.norm(turn) > _STANDING_RAD_S * seconds)
 
 
 def _level_start(first: Poses) -> Poses:
