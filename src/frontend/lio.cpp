@@ -110,7 +110,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     live_.utime = sample.utime;
   } else if (!running_) {
     if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
-    start_finding_.clear();
+    start_finding_.clear();  // what scans did not tell before says nothing of what keeps it waiting now
     if (const std::optional<FilterState> first = initialisation_.add(sample)) {
       config_.start == "moving" ? start_moving(*first) : start(*first);
     }

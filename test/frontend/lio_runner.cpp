@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include <Eigen/Geometry>
 
@@ -63,6 +64,19 @@ double aligned_error(const LioRun& run, const Drive& drive) {
 double end_error(const LioRun& run, const Drive& drive) {
   const NavState& last = run.scans.back().state;
   return (last.T_odom_body.translation - drive.truth(drive_seconds(drive, last.utime)).translation).norm();
+}
+
+double worst_silent_error(const LioRun& run, const Drive& drive) {
+  double worst = -1.0;
+  std::optional<Pose> T_odom_world;
+  for (const ScanResult& scan : run.scans) {
+    if (!scan.has_state) continue;
+    const Pose truth = drive.truth(drive_seconds(drive, scan.state.utime));
+    if (!T_odom_world) T_odom_world = scan.state.T_odom_body * truth.inverse();
+    const double error = (*T_odom_world * truth.translation - scan.state.T_odom_body.translation).norm();
+    if (scan.trust == Trust::kOk) worst = std::max(worst, error);
+  }
+  return worst;
 }
 
 PoseNees pose_nees(const LioRun& run, const Drive& drive) {

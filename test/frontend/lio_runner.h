@@ -27,6 +27,10 @@ struct LioRun {
 /// [m] Position error at the last scan, in the frame of the start.
 [[nodiscard]] double end_error(const LioRun& run, const Drive& drive);
 
+/// [m] The largest error of a pose that was reported as OK, the first pose laid on the true one; negative when none
+/// was.
+[[nodiscard]] double worst_silent_error(const LioRun& run, const Drive& drive);
+
 /// Squared errors of the pose over what the published covariance says, per degree of freedom.
 struct PoseNees {
   double position = 0.0;

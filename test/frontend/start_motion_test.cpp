@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/so3.h"
@@ -95,32 +94,10 @@ TEST(StartMotion, ARollingStartKeepsWhatTheGyroReadAsTurnAndBias) {
   EXPECT_GT(first.covariance(kGravityTilt, kGravityTilt), before(kGravityTilt, kGravityTilt));
 }
 
-/// [m] The largest error of a pose that was reported as OK; negative when none was.
-double worst_silent_error(const Drive& drive) {
-  Lio lio(test::tuned_config());
-  double worst = -1.0;
-  std::optional<Pose> T_odom_world;
-  auto scan = drive.scans.begin();
-  const auto take = [&](const std::vector<ScanResult>& results) {
-    for (const ScanResult& result : results) {
-      if (!result.has_state) continue;
-      const Pose truth = drive.truth(test::drive_seconds(drive, result.state.utime));
-      if (!T_odom_world) T_odom_world = result.state.T_odom_body * truth.inverse();
-      const double error = (*T_odom_world * truth.translation - result.state.T_odom_body.translation).norm();
-      if (result.trust == Trust::kOk) worst = std::max(worst, error);
-    }
-  };
-  for (const ImuSample& sample : drive.imu) {
-    for (; scan != drive.scans.end() && scan->end_utime() + 2'000 <= sample.utime; ++scan) take(lio.add_scan(*scan));
-    take(lio.add_imu(sample).scans);
-  }
-  return worst;
-}
-
 TEST(Fault_F5, AStartInMotionGoesOnAtTheTrueSpeed) {
   for (const double speed : {0.3, 0.7, 1.5, 3.0}) {
     const Drive cruise = test::simulate(test::street(), test::straight_drive(0.0, speed), 6.0, Sensors{}, 6);
-    const double worst = worst_silent_error(cruise);
+    const double worst = test::worst_silent_error(run_lio(test::tuned_config(), cruise), cruise);
     EXPECT_LT(worst, 0.2) << speed;
     EXPECT_GE(worst, 0.0) << speed << ": it becomes OK";
   }

@@ -155,6 +155,11 @@ def test_the_peers_process_is_told_how_long_the_rest_is(monkeypatch: pytest.Monk
     assert commands[0][-2:] == ["--rest", 0.0]
 
 
+def test_a_table_of_failures_alone_is_one_of_equal_rows() -> None:
+    lines = table([outcome("ours: ESKF", 1, failed="lost"), outcome("rko-lio", 1, failed="lost")]).splitlines()
+    assert {line.count("|") for line in lines if line.startswith("|")} == {5}
+
+
 def test_without_truth_the_way_from_the_end_back_to_the_start_is_told() -> None:
     trajectory = Trajectory(np.arange(3), Poses(np.array([[0, 0, 0], [9, 9, 9], [3, 4, 0.0]]), np.eye(4)[[0, 0, 0]]))
     drive = Drive("loop", "l1", None, Path(), Path(), None)
