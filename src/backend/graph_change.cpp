@@ -105,12 +105,6 @@ void copy_scalars(const SmootherState& from, SmootherState& to) {
   to.revision = from.revision;
 }
 
-bool is_same_place(const NavState& a, const NavState& b) {
-  return a.T_odom_body.rotation.coeffs() == b.T_odom_body.rotation.coeffs() &&
-         a.T_odom_body.translation == b.T_odom_body.translation && a.v_odom == b.v_odom && a.gyro_bias == b.gyro_bias &&
-         a.accel_bias == b.accel_bias;
-}
-
 std::size_t index_of(const std::vector<GraphNode>& nodes, std::int32_t id) {
   const auto found = std::ranges::lower_bound(nodes, id, {}, [](const GraphNode& node) { return node.end.id; });
   return found != nodes.end() && found->end.id == id ? static_cast<std::size_t>(found - nodes.begin()) : nodes.size();
@@ -181,28 +175,23 @@ std::string RestoredGraph::apply(GraphChange change) {
 ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph()) {}
 
 ChangeTracker::ChangeTracker(const RestoredGraph& known)
-    : linearised_(known.linearised), vetoes_(known.state.vetoes.size()) {
+    : nodes_(known.state.nodes.size()), vetoes_(known.state.vetoes.size()) {
   static_cast<void>(loops_.next(known.state.loops));
   static_cast<void>(waiting_.next(known.state.waiting));
 }
 
 GraphChange ChangeTracker::next(const SmootherState& state, std::vector<LinearisationPoint> linearised) {
   GraphChange change;
-  const auto known = static_cast<std::ptrdiff_t>(linearised_.size());
-  change.state.nodes.assign(state.nodes.begin() + known, state.nodes.end());
-  for (std::size_t i = linearised_.size(); i < state.nodes.size(); ++i) {
+  change.state.nodes.assign(state.nodes.begin() + static_cast<std::ptrdiff_t>(nodes_), state.nodes.end());
+  for (std::size_t i = nodes_; i < state.nodes.size(); ++i) {
     const CompactCloud* cloud = state.clouds.in_memory(i);
     change.clouds.push_back(cloud != nullptr ? *cloud : CompactCloud());
   }
+  nodes_ = state.nodes.size();
   change.state.vetoes.assign(state.vetoes.begin() + static_cast<std::ptrdiff_t>(vetoes_), state.vetoes.end());
   vetoes_ = state.vetoes.size();
   copy_scalars(state, change.state);
-  for (std::size_t i = 0; i < linearised.size(); ++i) {
-    if (i >= linearised_.size() || !is_same_place(linearised_[i].state, linearised[i].state)) {
-      change.linearised.push_back(linearised[i]);
-    }
-  }
-  linearised_ = std::move(linearised);
+  change.linearised = std::move(linearised);
   change.loops = loops_.next(state.loops);
   change.waiting = waiting_.next(state.waiting);
   return change;

@@ -52,11 +52,11 @@ class ChangeTracker {
   /// Begins at a graph that is known already.
   explicit ChangeTracker(const RestoredGraph& known);
 
-  /// `linearised`: one per node of `state`.
+  /// `linearised`: of the nodes of `state` that are new or whose point has moved since.
   [[nodiscard]] GraphChange next(const SmootherState& state, std::vector<LinearisationPoint> linearised);
 
  private:
-  std::vector<LinearisationPoint> linearised_;
+  std::size_t nodes_ = 0;
   LoopListMemory loops_;
   LoopListMemory waiting_;
   std::size_t vetoes_ = 0;

@@ -55,7 +55,7 @@ std::optional<LoopEvidence> evidence_of(std::span<const GraphLoop* const> loops,
     parts.push_back({loop->rows * slope, std::ranges::contains(state.loops, loop->number, &GraphLoop::number)});
     row += 6;
   }
-  Eigen::MatrixXd covariance = solver.relative_covariances(ends, ends);
+  Eigen::MatrixXd covariance = solver.relative_covariance(ends);
   if (covariance.size() == 0) return std::nullopt;
   return LoopEvidence(std::move(parts), std::move(covariance), std::move(errors));
 }

@@ -5,6 +5,8 @@
 #include <gtsam/nonlinear/NonlinearFactorGraph.h>
 #include <gtsam/nonlinear/Values.h>
 
+#include <set>
+
 #include "backend/keyframe_factors.h"
 #include "backend/relative_pose_factor.h"
 #include "backend/revision_report.h"
@@ -13,11 +15,14 @@ namespace ignis {
 
 using gtsam::symbol_shorthand::X;
 
-std::vector<LinearisationPoint> linearisation_of(const IncrementalSolver& solver, const SmootherState& state) {
+std::vector<LinearisationPoint> take_linearised(IncrementalSolver& solver) {
+  std::set<std::int32_t> ids;  // of whichever of a keyframe's variables
+  for (const gtsam::Key key : solver.take_relinearised()) {
+    ids.insert(static_cast<std::int32_t>(gtsam::Symbol(key).index()));
+  }
   const gtsam::Values& values = solver.linearisation_points();
   std::vector<LinearisationPoint> points;
-  points.reserve(state.nodes.size());
-  for (const GraphNode& node : state.nodes) points.push_back({node.end.id, estimate_of(values, node.end.id)});
+  for (const std::int32_t id : ids) points.push_back({id, estimate_of(values, id)});
   return points;
 }
 
@@ -34,6 +39,7 @@ std::string restore_solver(RestoredGraph& graph, const BackendConfig& config, In
   for (const LinearisationPoint& point : graph.linearised) insert_estimate(point.id, point.state, values);
   const SolverOutcome outcome = solver.add(factors, values);
   if (!outcome.accepted) return outcome.reason;
+  static_cast<void>(solver.take_relinearised());  // the journal has them
   const std::size_t first_loop = outcome.factors.size() - state.loops.size();
   for (std::size_t i = 0; i < state.loops.size(); ++i) state.loops[i].factor = outcome.factors[first_loop + i];
   refresh_poses(solver, state);

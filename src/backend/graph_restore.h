@@ -10,9 +10,9 @@
 /// Between the solver and the journal.
 namespace ignis {
 
-/// Where the solver has linearised, one per node.
-[[nodiscard]] std::vector<LinearisationPoint> linearisation_of(const IncrementalSolver& solver,
-                                                               const SmootherState& state);
+/// Where the solver has linearised the keyframes that are new, or that it had linearised elsewhere when this was asked
+/// last. Ascending.
+[[nodiscard]] std::vector<LinearisationPoint> take_linearised(IncrementalSolver& solver);
 
 /// Gives a fresh solver all factors of `graph` in one update, linearised where they were, and fills what follows from
 /// it: poses, and the loops' factor ids. The reason when the solver refuses; empty when all is well.

@@ -8,10 +8,10 @@
 #include <gtsam/nonlinear/Values.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/unordered/unordered_flat_set.hpp>
 #include <cmath>
 #include <format>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -37,6 +37,13 @@ Isam2Settings settings(const SolverConfig& config) {
 }
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<gtsam::Key> each_once(std::vector<gtsam::Key> keys) {
+  std::ranges::sort(keys);
+  const auto twice = std::ranges::unique(keys);
+  keys.erase(twice.begin(), twice.end());
+  return keys;
+}
 
 std::string name_of(gtsam::Key key) { return std::string(gtsam::Symbol(key)); }
 
@@ -75,7 +82,9 @@ struct IncrementalSolver::Impl {
     try {
       Isam2::Step step = isam.advance(batch, news, removed);
       indices = std::move(step.new_factors);
-      relinearised = step.relinearised;
+      std::ranges::copy(news.keys(), std::back_inserter(relinearised));
+      std::ranges::copy(step.relinearised, std::back_inserter(relinearised));
+      is_settled = step.relinearised.empty();
       stale.insert(step.moved.begin(), step.moved.end());
       changed.insert(changed.end(), step.moved.begin(), step.moved.end());
     } catch (const gtsam::IndeterminantLinearSystemException& e) {
@@ -90,6 +99,7 @@ struct IncrementalSolver::Impl {
   /// solution and refuses everything from then on.
   void rebuild() {
     isam = Isam2(params);
+    std::ranges::copy(values.keys(), std::back_inserter(relinearised));
     stale.clear();
     id_of.clear();
     gtsam::NonlinearFactorGraph living;
@@ -140,14 +150,12 @@ struct IncrementalSolver::Impl {
   }
 
   /// What the offsets of two poses make of the offset of the second against the first, in body axes of the second.
-  [[nodiscard]] std::array<Isam2::Term, 2> relative_terms(const KeyPair& pair) const {
+  [[nodiscard]] Isam2::Sum relative_terms(const KeyPair& pair) const {
     const gtsam::Values& points = isam.linearisation_points();
     const auto& [from, to] = pair;
     const gtsam::Matrix6 A = -points.at<gtsam::Pose3>(to).between(points.at<gtsam::Pose3>(from)).AdjointMap();
-    return {Isam2::Term{from, A}, Isam2::Term{to, gtsam::I_6x6}};
+    return {{from, A}, {to, gtsam::I_6x6}};
   }
-
-  [[nodiscard]] Isam2::Root relative_root(const KeyPair& pair) const { return isam.root(relative_terms(pair)); }
 
   double error_of(FactorId id) {
     const gtsam::Values& around = estimate_of(factors.at(id)->keys());
@@ -164,7 +172,8 @@ struct IncrementalSolver::Impl {
   gtsam::Values values;  ///< of each variable, the last solution that was asked for, or its first value
   boost::unordered_flat_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
   std::vector<gtsam::Key> changed;              ///< variables that it has moved since take_changed()
-  bool relinearised = false;                    ///< something, in the last update
+  std::vector<gtsam::Key> relinearised;         ///< variables with a new linearisation point since take_relinearised()
+  bool is_settled = false;                      ///< the last update linearised nothing anew
   int rebuilds = 0;
   std::string broken;  ///< why nothing is accepted any more; empty while all is well
 };
@@ -230,7 +239,7 @@ bool IncrementalSolver::settle(int updates) {
       impl_->recover();
       return false;
     }
-    idle = impl_->relinearised ? 0 : idle + 1;
+    idle = impl_->is_settled ? idle + 1 : 0;
   }
   // Should iSAM2 have to be built anew one day, then not where the graph was before a large correction.
   impl_->estimate();
@@ -243,12 +252,10 @@ const gtsam::Values& IncrementalSolver::estimate_of(std::span<const std::uint64_
   return impl_->estimate_of(keys);
 }
 
-std::vector<std::uint64_t> IncrementalSolver::take_changed() {
-  std::vector<std::uint64_t> changed = std::exchange(impl_->changed, {});
-  std::ranges::sort(changed);
-  const auto twice = std::ranges::unique(changed);
-  changed.erase(twice.begin(), twice.end());
-  return changed;
+std::vector<std::uint64_t> IncrementalSolver::take_changed() { return each_once(std::exchange(impl_->changed, {})); }
+
+std::vector<std::uint64_t> IncrementalSolver::take_relinearised() {
+  return each_once(std::exchange(impl_->relinearised, {}));
 }
 
 const gtsam::Values& IncrementalSolver::linearisation_points() const {
@@ -282,32 +289,28 @@ std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint6
   }
 }
 
-std::vector<Matrix6d> IncrementalSolver::relative_covariances(std::span<const KeyPair> pairs) const {
+Eigen::MatrixXd IncrementalSolver::relative_covariance(std::span<const KeyPair> pairs) const {
   if (!impl_->broken.empty()) return {};
-  std::vector<Matrix6d> covariances;
-  for (const KeyPair& pair : pairs) {
-    const Isam2::Root root = impl_->relative_root(pair);
-    covariances.emplace_back(Isam2::covariance(root, root));
-    if (!covariances.back().allFinite()) return {};
-  }
-  return covariances;
-}
-
-Eigen::MatrixXd IncrementalSolver::relative_covariances(std::span<const KeyPair> rows,
-                                                        std::span<const KeyPair> columns) const {
-  if (!impl_->broken.empty()) return {};
-  std::vector<Isam2::Root> roots;
-  for (const KeyPair& pair : columns) roots.push_back(impl_->relative_root(pair));
-  Eigen::MatrixXd covariances(6 * std::ssize(rows), 6 * std::ssize(columns));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Isam2::Root root = impl_->relative_root(rows[i]);
-    for (std::size_t k = 0; k < roots.size(); ++k) {
-      covariances.block<6, 6>(6 * static_cast<Eigen::Index>(i), 6 * static_cast<Eigen::Index>(k)) =
-          Isam2::covariance(root, roots[k]);
+  Isam2::Sum all;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (Isam2::Term& term : impl_->relative_terms(pairs[i])) {
+      Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(6 * std::ssize(pairs), 6);
+      factor.middleRows<6>(6 * static_cast<Eigen::Index>(i)) = term.factor;
+      all.push_back({term.key, std::move(factor)});
     }
   }
-  if (!covariances.allFinite()) return {};
-  return covariances;
+  Eigen::MatrixXd covariance = impl_->isam.covariance(all);
+  if (!covariance.allFinite()) return {};
+  return covariance;
+}
+
+Eigen::MatrixXd IncrementalSolver::relative_covariance(const KeyPair& pair, std::span<const KeyPair> others) const {
+  if (!impl_->broken.empty()) return {};
+  std::vector<Isam2::Sum> sums;
+  for (const KeyPair& other : others) sums.push_back(impl_->relative_terms(other));
+  Eigen::MatrixXd covariance = impl_->isam.covariance(impl_->relative_terms(pair), sums);
+  if (!covariance.allFinite()) return {};
+  return covariance;
 }
 
 Vector6d IncrementalSolver::relative_offset(const KeyPair& pair) const {

@@ -83,6 +83,9 @@ class IncrementalSolver {
   /// Keys of the variables that the solution has moved since the last call, ascending.
   [[nodiscard]] std::vector<std::uint64_t> take_changed();
 
+  /// Keys of the variables that are linearised elsewhere than at the last call, or new, ascending.
+  [[nodiscard]] std::vector<std::uint64_t> take_relinearised();
+
   /// Where the factors are linearised. A solver that begins with these values and the same factors has the same
   /// solution.
   [[nodiscard]] const gtsam::Values& linearisation_points() const;
@@ -103,13 +106,12 @@ class IncrementalSolver {
   /// Two pose variables.
   using KeyPair = std::pair<std::uint64_t, std::uint64_t>;
 
-  /// Covariances of the relative poses of pairs of pose variables, in body axes of the second of each, where the
-  /// factors are linearised. Empty when they cannot be computed.
-  [[nodiscard]] std::vector<Matrix6d> relative_covariances(std::span<const KeyPair> pairs) const;
+  /// Covariance of the relative poses of pairs of pose variables, six rows and columns for each, in body axes of the
+  /// second of the pair, where the factors are linearised. Empty when it cannot be computed.
+  [[nodiscard]] Eigen::MatrixXd relative_covariance(std::span<const KeyPair> pairs) const;
 
-  /// The same between the relative poses of `rows` and those of `columns`: six rows or columns for each.
-  [[nodiscard]] Eigen::MatrixXd relative_covariances(std::span<const KeyPair> rows,
-                                                     std::span<const KeyPair> columns) const;
+  /// The same of one of them with others: six rows, and six columns for each.
+  [[nodiscard]] Eigen::MatrixXd relative_covariance(const KeyPair& pair, std::span<const KeyPair> others) const;
 
   /// How far the solution has moved the second pose of a pair against the first from where the factors are linearised,
   /// to first order: attitude then position, in body axes of the second. Both must exist.

@@ -33,7 +33,7 @@ Isam2::Step Isam2::advance(const gtsam::NonlinearFactorGraph& factors, const gts
     above = above_threshold();
     unchecked_.clear();
   }
-  step.relinearised = !above.empty();
+  for (const int number : above) step.relinearised.push_back(variable(number).key);
   std::vector<int> news;  // variables of new and removed factors
   for (const std::size_t index : removed) {
     const std::vector<int>& held = factors_.at(index).linear.variables;

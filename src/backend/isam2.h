@@ -40,7 +40,7 @@ class Isam2 {
   struct Step {
     std::vector<std::size_t> new_factors;  ///< indices of the new factors, in their order; never used again
     gtsam::KeyVector moved;                ///< variables whose offset or linearisation point has changed
-    bool relinearised = false;             ///< something was linearised anew
+    gtsam::KeyVector relinearised;         ///< variables whose linearisation point has changed
   };
 
   /// One update with its back-substitution. Throws gtsam::IndeterminantLinearSystemException.
@@ -61,27 +61,18 @@ class Isam2 {
   /// Covariance in the tangent space of the linearisation point. The variable must exist.
   [[nodiscard]] Eigen::MatrixXd covariance(gtsam::Key key) const;
 
-  /// A variable's part in a sum: its offset times `factor`.
+  /// A variable's part in a sum: its offset times `factor`. All factors of a sum have the same number of rows.
   struct Term {
     gtsam::Key key = 0;
     Eigen::MatrixXd factor;
   };
-  /// Covariance of a sum of terms of different variables, which must exist: of a relative pose, for example. Costs the
-  /// way from these variables to the roots.
+  using Sum = std::vector<Term>;
+  /// Covariance of a sum of terms of variables, which must exist: of relative poses, for example. Costs the way from
+  /// these variables to the roots.
   [[nodiscard]] Eigen::MatrixXd covariance(std::span<const Term> terms) const;
-
-  /// A sum of terms as what its covariances are products of: of two sums it is A'B, where A and B are their roots. A
-  /// root's rows belong to cliques, most of which it leaves out for zero. Good until the next update.
-  struct Root {
-    struct Part {
-      int clique = 0;
-      Eigen::MatrixXd rows;
-    };
-    Eigen::Index size = 0;
-    std::vector<Part> parts;  ///< ascending
-  };
-  [[nodiscard]] Root root(std::span<const Term> terms) const;
-  [[nodiscard]] static Eigen::MatrixXd covariance(const Root& a, const Root& b);
+  /// Covariances of such a sum with others, beside each other. Costs a back-substitution of the whole tree, however
+  /// many they are.
+  [[nodiscard]] Eigen::MatrixXd covariance(std::span<const Term> terms, std::span<const Sum> others) const;
 
   /// Scalars of quadratic forms that wait for the next elimination, and of conditionals.
   struct Size {
@@ -160,6 +151,14 @@ class Isam2 {
 
   /// The cliques from those of `terms` to the roots, children before parents.
   [[nodiscard]] std::vector<int> way_to_roots(std::span<const Term> terms) const;
+  /// Solves L Y = F on that way, for the F of `terms`: calls visit(clique, rows of Y of its frontals) at each clique.
+  void climb(std::span<const Term> terms, auto visit) const;
+  /// Solves L' X = Y for all variables: by clique, rows of Y of its frontals, or none where they are zero. Rows of
+  /// `solution` are where those of delta_ are.
+  void descend(std::span<const Eigen::MatrixXd> y_of, Eigen::MatrixXd& solution) const;
+  [[nodiscard]] auto rows_of(int number, auto& matrix) const {
+    return matrix.middleRows(static_cast<Eigen::Index>(variable(number).offset), dimension(number));
+  }
 
   Isam2Settings settings_;
   int updates_ = 0;

@@ -17,8 +17,7 @@ std::vector<const GraphLoop*> defenders_against(const GraphLoop& challenger, con
                                                 const SmootherState& state) {
   std::vector<IncrementalSolver::KeyPair> ends;
   for (const GraphLoop& loop : state.loops) ends.push_back(ends_of(loop));
-  const IncrementalSolver::KeyPair own = ends_of(challenger);
-  const Eigen::MatrixXd with_own = solver.relative_covariances({&own, 1}, ends);
+  const Eigen::MatrixXd with_own = solver.relative_covariance(ends_of(challenger), ends);
   if (with_own.size() == 0) return {};
   std::vector<std::pair<double, const GraphLoop*>> by_influence;
   for (std::size_t i = 0; i < state.loops.size(); ++i) {

@@ -190,7 +190,7 @@ SmootherStats Smoother::stats() const {
 
 std::vector<std::byte> Smoother::take_change() {
   auto& impl = *impl_;
-  const GraphChange change = impl.tracker.next(impl.state, linearisation_of(impl.solver, impl.state));
+  const GraphChange change = impl.tracker.next(impl.state, take_linearised(impl.solver));
   impl.state.clouds.note_record(impl.changes++);
   return encode_change(change);
 }

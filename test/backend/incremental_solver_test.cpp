@@ -120,6 +120,33 @@ TEST(IncrementalSolver, RefusesBeforeTheSolverSeesIt) {
   expect_good_chain(chain, 6);
 }
 
+TEST(IncrementalSolver, TellsEveryNewPointOfLinearisation) {
+  SolverChain chain;
+  gtsam::Values told;
+  const auto expect_all_told = [&](const char* when) {
+    const gtsam::Values& points = chain.solver.linearisation_points();
+    for (const gtsam::Key key : chain.solver.take_relinearised()) told.insert_or_assign(key, points.at(key));
+    EXPECT_TRUE(told.equals(points, 0.0)) << when;
+  };
+  for (int i = 0; i < 20; ++i) {
+    chain.add(i);
+    expect_all_told("a new pose");
+  }
+  EXPECT_TRUE(chain.solver.take_relinearised().empty()) << "nothing has happened since";
+  gtsam::NonlinearFactorGraph pull;
+  pull.addPrior(X(19), Pose3(gtsam::Rot3(), {1.0, 2.0, 3.0}), kNoise);
+  const SolverOutcome pulled = chain.solver.add(pull, {});
+  ASSERT_TRUE(pulled.accepted);
+  chain.solver.settle(5);
+  expect_all_told("a correction");
+  gtsam::Values shifted = chain.solver.estimate();
+  shifted.update(X(7), shifted.at<Pose3>(X(7)) * Pose3(gtsam::Rot3(), {0.1, 0.0, 0.0}));
+  ASSERT_TRUE(chain.solver.restart_at(shifted));
+  expect_all_told("a new beginning");
+  ASSERT_TRUE(chain.solver.remove(pulled.factors).accepted);
+  expect_all_told("a factor less");
+}
+
 TEST(IncrementalSolver, ConstrainsOnlyTheDirectionsGiven) {
   IncrementalSolver solver{SolverConfig()};
   gtsam::NonlinearFactorGraph factors;
