@@ -64,6 +64,7 @@ struct FrontendConfig {
   double contradiction_sigma = 4.2;
   double moving_surface_sigma = 3.0;
   int map_average_points = 1;
+  bool map_two_faces = false;
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
   double imu_timeout_s = 0.5;
@@ -206,6 +207,8 @@ struct FrontendConfig {
                  "distance from the map at which surfaces that few others face the way of have moved; 0: off");
     visit.integer("map_average_points", self.map_average_points, {1, 60000}, "points",
                   "1: a voxel keeps the point nearest its centre; more: the mean of its points, up to this weight");
+    visit.flag("map_two_faces", self.map_two_faces,
+               "a voxel keeps apart what was seen from opposite sides: walls thinner than 0.2 m");
     visit.number("map_drift", self.map_drift, {0.0, 1000.0}, "1",
                  "factor on the variance that each scan leaves in the published covariance for good");
     visit.number("wide_match_radius_m", self.wide_match_radius_m, {0.0, 10.0}, "m",

@@ -27,7 +27,8 @@ LocalMap::LocalMap(const FrontendConfig& config)
       window_(config.map_window_m),
       window_y_(config.map_window_y),
       memory_(std::max(config.map_memory_m, config.map_window_m)),
-      average_points_(static_cast<float>(config.map_average_points)) {
+      average_points_(static_cast<float>(config.map_average_points)),
+      two_faces_(config.map_two_faces) {
   config::require_valid(config, "frontend");
   clear();
 }
@@ -82,7 +83,7 @@ LocalMap::Region& LocalMap::find_or_add_region(const Eigen::Vector3i& coordinate
   return regions_.back();
 }
 
-std::int32_t LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) {
+std::int32_t LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate, std::uint32_t face) {
   const Eigen::Vector3i parent = cube_of(coordinate);
   const int bit = bit_of(coordinate - kEdge * parent);
   // A scan stays in a region for some blocks before it goes on to the next.
@@ -90,12 +91,13 @@ std::int32_t LocalMap::find_or_add_block(const Eigen::Vector3i& coordinate) {
     newest_region_ = static_cast<std::size_t>(&find_or_add_region(parent) - regions_.data());
   }
   Region& region = regions_[newest_region_];
-  if ((region.present >> bit & 1U) == 0) {
-    region.present |= std::uint64_t{1} << bit;
-    region.blocks[bit] = static_cast<std::int32_t>(blocks_.size());
-    blocks_.emplace_back().coordinate = coordinate;
+  if (!region.has(face, bit)) {
+    region.put(face, bit, blocks_.size());
+    Block& added = blocks_.emplace_back();
+    added.coordinate = coordinate;
+    added.face = face;
   }
-  return region.blocks[bit];
+  return region.blocks[face][bit];
 }
 
 void LocalMap::rebuild_table(std::size_t capacity) {
@@ -113,8 +115,7 @@ void LocalMap::rebuild_regions() {
   table_.assign(kFirstCapacity, kFree);
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const auto [region, bit] = home_of(blocks_[i]);
-    region->present |= std::uint64_t{1} << bit;
-    region->blocks[bit] = static_cast<std::int32_t>(i);
+    region->put(blocks_[i].face, bit, i);
   }
 }
 
@@ -143,7 +144,7 @@ void LocalMap::insert_all(auto points, const Pose& T_odom_body, bool confirmed, 
       const Eigen::Vector3i voxel = voxel_of(point, voxel_size_);
       const Eigen::Vector3i coordinate = cube_of(voxel);
       if (block == kFree || coordinate != block_at) {
-        block = find_or_add_block(coordinate);
+        block = find_or_add_block(coordinate, 0);
         block_at = coordinate;
         corner = kEdge * voxel_size_ * coordinate.cast<double>();
       }
@@ -159,8 +160,18 @@ void LocalMap::insert_all(auto points, const Pose& T_odom_body, bool confirmed, 
   }
 }
 
+bool LocalMap::shows_other_face(const Place& place) const {
+  const Block& block = blocks_[static_cast<std::size_t>(place.block)];
+  return (block.occupied >> place.bit & 1U) != 0 && block.voxel(place.bit).view.dot(place.view) < 0.0F;
+}
+
 void LocalMap::insert_point(const Place& place, bool confirmed) {
-  Block& block = blocks_[static_cast<std::size_t>(place.block)];
+  std::int32_t face = place.block;
+  if (two_faces_ && shows_other_face(place)) {
+    const Eigen::Vector3i coordinate = blocks_[static_cast<std::size_t>(place.block)].coordinate;
+    face = find_or_add_block(coordinate, 1);
+  }
+  Block& block = blocks_[static_cast<std::size_t>(face)];
   const int bit = place.bit;
   const std::uint64_t flag = std::uint64_t{1} << bit;
   const auto scan = static_cast<float>(scans_);
@@ -221,19 +232,23 @@ std::optional<Eigen::Vector3d> LocalMap::nearest(const Eigen::Vector3d& query, d
   return query + best->cast<double>();
 }
 
-std::optional<Eigen::Vector3d> LocalMap::own_voxel(const Eigen::Vector3d& query, float min_points) const {
+std::optional<Eigen::Vector3d> LocalMap::own_voxel(const Eigen::Vector3d& query, float min_points,
+                                                   const Eigen::Vector3d& side) const {
   const Eigen::Vector3i voxel = voxel_of(query, voxel_size_);
   const Eigen::Vector3i coordinate = cube_of(voxel);
   const Eigen::Vector3i parent = cube_of(coordinate);
   const Region* region = find_region(parent);
   const int block_bit = bit_of(coordinate - kEdge * parent);
-  if (region == nullptr || (region->present >> block_bit & 1U) == 0) return std::nullopt;
-  const Block& block = blocks_[static_cast<std::size_t>(region->blocks[block_bit])];
   const int bit = bit_of(voxel - kEdge * coordinate);
-  if ((block.confirmed >> bit & 1U) == 0) return std::nullopt;
-  const Voxel found = block.voxel(bit);
-  if (found.weight < min_points) return std::nullopt;
-  return kEdge * voxel_size_ * coordinate.cast<double>() + found.point.cast<double>();
+  for (std::uint32_t face = 0; region != nullptr && face < kFaces; ++face) {
+    if (!region->has(face, block_bit)) continue;
+    const Block& block = blocks_[static_cast<std::size_t>(region->blocks[face][block_bit])];
+    if ((block.confirmed >> bit & 1U) == 0) continue;
+    const Voxel found = block.voxel(bit);
+    if (found.weight < min_points || found.view.dot(side.cast<float>()) < 0.0F) continue;
+    return kEdge * voxel_size_ * coordinate.cast<double>() + found.point.cast<double>();
+  }
+  return std::nullopt;
 }
 
 void LocalMap::slide(const Eigen::Vector3d& position, int sure_since) {
@@ -293,11 +308,11 @@ void LocalMap::prune(Block& block) {
 /// The last block takes its place.
 void LocalMap::drop_block(std::size_t index) {
   const auto [region, bit] = home_of(blocks_[index]);
-  region->present &= ~(std::uint64_t{1} << bit);
+  region->present[blocks_[index].face] &= ~(std::uint64_t{1} << bit);
   if (index + 1 != blocks_.size()) {
     blocks_[index] = blocks_.back();
     const auto [moved_region, moved_bit] = home_of(blocks_[index]);
-    moved_region->blocks[moved_bit] = static_cast<std::int32_t>(index);
+    moved_region->put(blocks_[index].face, moved_bit, index);
   }
   blocks_.pop_back();
 }
@@ -308,7 +323,7 @@ LocalMap::Home LocalMap::home_of(const Block& block) {
 }
 
 void LocalMap::drop_empty_regions() {
-  std::erase_if(regions_, [](const Region& region) { return region.present == 0; });
+  std::erase_if(regions_, [](const Region& region) { return (region.present[0] | region.present[1]) == 0; });
   rebuild_table(table_.size());
 }
 

@@ -20,7 +20,9 @@ namespace ignis {
 /// The cloud that scans are matched against: one point per voxel in a window that slides with the vehicle. Frame odom,
 /// metres. The point is the one nearest the voxel's centre, with weight 1, or, with map_average_points above 1, the
 /// mean of all that fell into the voxel, with their number as its weight and the newest counting at least 1 /
-/// map_average_points: range noise averages out. Each remembers from where it was seen: a thin wall has two sides.
+/// map_average_points: range noise averages out. Each remembers from where it was seen: a thin wall has two sides. With
+/// map_two_faces a voxel has room for two points: what is seen from where the first one was not goes to the second, so
+/// that the two faces of a wall within one voxel do not meet in the middle.
 ///
 /// Voxels live in blocks of 4x4x4, blocks in regions of 4x4x4, with one bit of occupancy each; regions are found by
 /// open addressing. A neighbourhood is one or two regions, bit masks, and the rows of four voxels that these leave, two
@@ -46,9 +48,10 @@ class LocalMap {
   /// The confirmed point nearest a point, within a radius [m]. Costs what gather costs: for rare use.
   [[nodiscard]] std::optional<Eigen::Vector3d> nearest(const Eigen::Vector3d& query, double radius) const;
 
-  /// The confirmed point (odom, [m]) of the voxel that a point lies in; nothing where there is none, or fewer measured
-  /// points are in its mean than `min_points`.
-  [[nodiscard]] std::optional<Eigen::Vector3d> own_voxel(const Eigen::Vector3d& query, float min_points) const;
+  /// The confirmed point (odom, [m]) of the voxel that a point lies in, as seen from the side of a plane that `side`
+  /// points to; nothing where there is none, or fewer measured points are in its mean than `min_points`.
+  [[nodiscard]] std::optional<Eigen::Vector3d> own_voxel(const Eigen::Vector3d& query, float min_points,
+                                                         const Eigen::Vector3d& side) const;
 
   /// Calls of slide() that it takes to look through the map, so that no scan has to wait for all of it.
   static constexpr int kSlidesToSweep = 16;
@@ -73,6 +76,7 @@ class LocalMap {
  private:
   static constexpr int kEdge = 4;
   static constexpr int kCells = kEdge * kEdge * kEdge;
+  static constexpr int kFaces = 2;  ///< points that a voxel has room for, in blocks of their own
 
   /// Four voxels along x, each number ready for a vector register: two lines of the cache.
   struct alignas(128) Row {
@@ -97,6 +101,7 @@ class LocalMap {
   struct Block {
     Row rows[kCells / kEdge];
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of block edges
+    std::uint32_t face = 0;                                ///< which of its voxels' points
     std::uint64_t occupied = 0;
     std::uint64_t confirmed = 0;
     float oldest = 0.0F;  ///< no voxel has a smaller `scan`: these only grow
@@ -110,14 +115,20 @@ class LocalMap {
   struct Place {
     Eigen::Vector3f local;  ///< [m] relative to the block's corner
     Eigen::Vector3f view;   ///< unit vector to the body
-    std::int32_t block;     ///< index into blocks_
+    std::int32_t block;     ///< index into blocks_, of the first face
     int bit;                ///< voxel within the block
   };
 
   struct Region {
     Eigen::Vector3i coordinate = Eigen::Vector3i::Zero();  ///< in units of region edges
-    std::uint64_t present = 0;                             ///< blocks that exist
-    std::int32_t blocks[kCells] = {};                      ///< index into blocks_
+    std::uint64_t present[kFaces] = {};                    ///< blocks that exist
+    std::int32_t blocks[kFaces][kCells] = {};              ///< index into blocks_
+
+    [[nodiscard]] bool has(std::uint32_t face, int bit) const { return (present[face] >> bit & 1U) != 0; }
+    void put(std::uint32_t face, int bit, std::size_t block) {
+      present[face] |= std::uint64_t{1} << bit;
+      blocks[face][bit] = static_cast<std::int32_t>(block);
+    }
   };
 
   /// Where a block is found: bit `bit` of `region`.
@@ -141,8 +152,11 @@ class LocalMap {
   static void for_each_row(const Block& block, const Box& box, auto&& visit);
   [[nodiscard]] const Region* find_region(const Eigen::Vector3i& coordinate) const;
   [[nodiscard]] Region& find_or_add_region(const Eigen::Vector3i& coordinate);
-  [[nodiscard]] std::int32_t find_or_add_block(const Eigen::Vector3i& coordinate);  ///< index into blocks_
+  /// Index into blocks_.
+  [[nodiscard]] std::int32_t find_or_add_block(const Eigen::Vector3i& coordinate, std::uint32_t face);
   void insert_all(auto points, const Pose& T_odom_body, bool confirmed, auto position_of);
+  /// True when the place's voxel is taken by a point that was seen from the other side.
+  [[nodiscard]] bool shows_other_face(const Place& place) const;
   void insert_point(const Place& place, bool confirmed);
   void sweep(std::uint64_t blocks);
   void prune(Block& block);
@@ -162,6 +176,7 @@ class LocalMap {
   double window_y_;
   double memory_;  ///< [m] like window_, for points of whose place the map is sure; never less
   float average_points_;
+  bool two_faces_;
   std::vector<Block> blocks_;
   std::vector<Region> regions_;
   std::size_t newest_region_ = 0;    ///< index into regions_ of the one that was asked for last
@@ -178,6 +193,7 @@ class LocalMap {
   /// Taken voxels alone, each in one go: there are many.
   friend void transfer(auto& io, FieldsOf<Block> auto& block) {
     io.matrix(block.coordinate);
+    io.number(block.face);
     io.number(block.occupied);
     io.number(block.confirmed);
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {

@@ -106,9 +106,11 @@ void LocalMap::for_each_block(const Box& box, auto&& visit) const {
       for (at.x() = region_lo.x(); at.x() <= region_hi.x(); ++at.x()) {
         const Region* region = find_region(at);
         if (region == nullptr) continue;
-        std::uint64_t left = region->present & cubes::box_mask(at, block_lo, block_hi);
-        for (; left != 0; left &= left - 1) {
-          visit(blocks_[static_cast<std::size_t>(region->blocks[std::countr_zero(left)])]);
+        const std::uint64_t mask = cubes::box_mask(at, block_lo, block_hi);
+        for (int face = 0; face < kFaces; ++face) {
+          for (std::uint64_t left = region->present[face] & mask; left != 0; left &= left - 1) {
+            visit(blocks_[static_cast<std::size_t>(region->blocks[face][std::countr_zero(left)])]);
+          }
         }
       }
     }

@@ -6,6 +6,13 @@
 #include "frontend/four_planes.h"
 
 namespace ignis {
+namespace {
+
+// [m] Roughness up to which neighbours are taken for one face. A fiftieth of them on the other side of a wall of 0.1 m
+// makes as much.
+constexpr double kOneFace = 0.015;
+
+}  // namespace
 
 PlaneFinder::PlaneFinder(const FrontendConfig& config) : config_(config), wide_config_(config) {
   // A wide neighbourhood reaches round corners and over tree crowns: it has to be flatter to count as a plane.
@@ -29,16 +36,18 @@ std::span<const PlaneFit> PlaneFinder::find(const LocalMap& map, std::span<const
   return planes_;
 }
 
-/// Planes of the chosen queries. Where one was seen from its other side, it is that of the points seen from this side.
+/// Planes of the chosen queries. Where one was seen from its other side, or what it is made of may be the two faces of
+/// a wall, it is that of the points seen from this side.
 void PlaneFinder::fit_chosen(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
                              const Eigen::Vector3d& seen_from, const FrontendConfig& config, double radius) {
   fit(map, queries, config, radius, {});
   sides_.clear();
   std::erase_if(chosen_, [&](std::size_t i) {
     const Eigen::Vector3d view = seen_from - queries[i];
-    const bool other = is_seen_from_other_side(planes_[i], view);
-    if (other) sides_.push_back(planes_[i].normal.dot(view) > 0.0 ? planes_[i].normal : -planes_[i].normal);
-    return !other;
+    const bool has_faces = config.map_two_faces && planes_[i].scatter[0] > kOneFace * kOneFace;
+    const bool is_narrowed = has_faces || is_seen_from_other_side(planes_[i], view);
+    if (is_narrowed) sides_.push_back(side_of(planes_[i], view));
+    return !is_narrowed;
   });
   if (!chosen_.empty()) fit(map, queries, config, radius, sides_);
 }

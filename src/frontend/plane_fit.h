@@ -64,6 +64,11 @@ struct PlaneFit {
   return fit_plane(moments, config, config.match_radius_m);
 }
 
+/// The plane's normal, pointing to the side that the body is on. `view`: vector from the query point to the body [m].
+[[nodiscard]] inline Eigen::Vector3d side_of(const PlaneFit& plane, const Eigen::Vector3d& view) {
+  return plane.normal.dot(view) > 0.0 ? plane.normal : Eigen::Vector3d(-plane.normal);
+}
+
 /// True when the neighbours were seen from one side of their plane and the body is on the other: they are the far face
 /// of a wall. `view`: vector from the query point to the body [m]. Where the normal's own error decides on which side
 /// the body is, that says nothing; an angle is no measure of it: within a doorway the wall beside it is seen at a few

@@ -116,7 +116,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
       const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
-      const double distance = distance_along(plane, smoothness, queries_[i], map);
+      const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);
       constraints_.push_back({point_body, plane, distance, smoothness, 1.0});
     }
   }
@@ -137,10 +137,10 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
 }
 
 double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
-                                   const LocalMap& map) {
+                                   const Eigen::Vector3d& seen_from, const LocalMap& map) {
   const double of_all = plane.normal.dot(query + plane.offset);
   if (smoothness == 1.0) return of_all;
-  const std::optional<Eigen::Vector3d> own = map.own_voxel(query, kPointsOfAMean);
+  const std::optional<Eigen::Vector3d> own = map.own_voxel(query, kPointsOfAMean, side_of(plane, seen_from - query));
   return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
 }
 

@@ -87,7 +87,7 @@ class ScanMatcher {
   /// a plane, their mean is off to one side, before the edge or behind it, alike in scan after scan: the rougher the
   /// plane, the more is told by the points of the query's own voxel, which lie where the query does.
   [[nodiscard]] static double distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
-                                             const LocalMap& map);
+                                             const Eigen::Vector3d& seen_from, const LocalMap& map);
   /// Drops the constraints to surfaces that have moved, where they are among the few that face their way.
   void leave_out_moving_surfaces(int newest_scan);
   /// Drops the constraints to surfaces that the map has held for a moment only, as long as enough is left without them.

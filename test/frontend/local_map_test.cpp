@@ -217,7 +217,7 @@ TEST(LocalMap, FindsTheMeanOfTheVoxelThatAPointLiesInOnceItIsOfEnoughPoints) {
     const auto expected = std::ranges::find_if(
         all, [&](const Eigen::Vector3d& mean) { return (voxel_of(mean) == voxel_of(query)).all(); });
     const bool is_enough = expected != all.end() && map.gather(*expected, 1e-4).weight >= 5.0;
-    const std::optional<Eigen::Vector3d> found = map.own_voxel(query, 5.0F);
+    const std::optional<Eigen::Vector3d> found = map.own_voxel(query, 5.0F, Eigen::Vector3d::Zero());
     ASSERT_EQ(found.has_value(), is_enough);
     if (found) {
       EXPECT_EQ(*found, *expected);
