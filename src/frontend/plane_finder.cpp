@@ -2,15 +2,24 @@
 #include "frontend/plane_finder.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "frontend/four_planes.h"
 
 namespace ignis {
 namespace {
 
-// [m] Roughness up to which neighbours are taken for one face. A fiftieth of them on the other side of a wall of 0.1 m
-// makes as much.
-constexpr double kOneFace = 0.015;
+// [m] Roughness up to which neighbours are taken for one face: means of many points are smoother than that. One
+// neighbour in three hundred on the other side of a wall of 0.1 m makes as much.
+constexpr double kOneFace = 0.006;
+
+// Sine of the angle to a plane from which on it is clear which side it is seen from. Of what is seen more flatly, a far
+// floor, the normal's error would choose one half of the points.
+constexpr double kClear = 0.1;
+
+bool may_be_two_faces(const PlaneFit& plane, const Eigen::Vector3d& view) {
+  return plane.scatter[0] > kOneFace * kOneFace && std::abs(plane.normal.dot(view)) > kClear * view.norm();
+}
 
 }  // namespace
 
@@ -44,7 +53,7 @@ void PlaneFinder::fit_chosen(const LocalMap& map, std::span<const Eigen::Vector3
   sides_.clear();
   std::erase_if(chosen_, [&](std::size_t i) {
     const Eigen::Vector3d view = seen_from - queries[i];
-    const bool has_faces = config.map_two_faces && planes_[i].scatter[0] > kOneFace * kOneFace;
+    const bool has_faces = config.map_two_faces && may_be_two_faces(planes_[i], view);
     const bool is_narrowed = has_faces || is_seen_from_other_side(planes_[i], view);
     if (is_narrowed) sides_.push_back(side_of(planes_[i], view));
     return !is_narrowed;
