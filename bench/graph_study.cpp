@@ -102,7 +102,7 @@ std::vector<bool> contradicted(const GraphStudy& study, const std::vector<StudyL
   std::vector<bool> contradicted;
   for (const auto& [loop, is_true] : loops) {
     const std::pair<std::uint64_t, std::uint64_t> ends(key_of(loop.to_id), key_of(loop.from_id));
-    const Matrix6d covariance = loop.information.inverse() + solver.relative_covariances({&ends, 1}).at(0);
+    const Matrix6d covariance = loop.information.inverse() + solver.relative_covariance({&ends, 1});
     const Pose& T_map_to = study.drive.T_world_body[static_cast<std::size_t>(loop.to_id)];
     const Pose& T_map_from = study.drive.T_world_body[static_cast<std::size_t>(loop.from_id)];
     const Vector6d error = body_difference(loop.T_to_from, T_map_to.inverse() * T_map_from);

@@ -11,7 +11,6 @@
 #include <boost/unordered/unordered_flat_set.hpp>
 #include <cmath>
 #include <format>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -37,13 +36,6 @@ Isam2Settings settings(const SolverConfig& config) {
 }
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-std::vector<gtsam::Key> each_once(std::vector<gtsam::Key> keys) {
-  std::ranges::sort(keys);
-  const auto twice = std::ranges::unique(keys);
-  keys.erase(twice.begin(), twice.end());
-  return keys;
-}
 
 std::string name_of(gtsam::Key key) { return std::string(gtsam::Symbol(key)); }
 
@@ -82,8 +74,8 @@ struct IncrementalSolver::Impl {
     try {
       Isam2::Step step = isam.advance(batch, news, removed);
       indices = std::move(step.new_factors);
-      std::ranges::copy(news.keys(), std::back_inserter(relinearised));
-      std::ranges::copy(step.relinearised, std::back_inserter(relinearised));
+      for (const gtsam::Key key : news.keys()) relinearised.insert(key);
+      relinearised.insert(step.relinearised.begin(), step.relinearised.end());
       is_settled = step.relinearised.empty();
       stale.insert(step.moved.begin(), step.moved.end());
       changed.insert(changed.end(), step.moved.begin(), step.moved.end());
@@ -99,7 +91,8 @@ struct IncrementalSolver::Impl {
   /// solution and refuses everything from then on.
   void rebuild() {
     isam = Isam2(params);
-    std::ranges::copy(values.keys(), std::back_inserter(relinearised));
+    // Should it fail, linearisation_points() are these values from now on.
+    for (const gtsam::Key key : values.keys()) relinearised.insert(key);
     stale.clear();
     id_of.clear();
     gtsam::NonlinearFactorGraph living;
@@ -170,10 +163,10 @@ struct IncrementalSolver::Impl {
   std::vector<double> errors;                               ///< by FactorId: half chi-square at `values`, or kUnknown
   std::vector<FactorId> id_of;                              ///< by index in iSAM2
   gtsam::Values values;  ///< of each variable, the last solution that was asked for, or its first value
-  boost::unordered_flat_set<gtsam::Key> stale;  ///< variables that iSAM2 has moved since
-  std::vector<gtsam::Key> changed;              ///< variables that it has moved since take_changed()
-  std::vector<gtsam::Key> relinearised;         ///< variables with a new linearisation point since take_relinearised()
-  bool is_settled = false;                      ///< the last update linearised nothing anew
+  boost::unordered_flat_set<gtsam::Key> stale;         ///< variables that iSAM2 has moved since
+  std::vector<gtsam::Key> changed;                     ///< variables that it has moved since take_changed()
+  boost::unordered_flat_set<gtsam::Key> relinearised;  ///< that it has linearised anew since take_relinearised()
+  bool is_settled = false;                             ///< the last update linearised nothing anew
   int rebuilds = 0;
   std::string broken;  ///< why nothing is accepted any more; empty while all is well
 };
@@ -252,10 +245,19 @@ const gtsam::Values& IncrementalSolver::estimate_of(std::span<const std::uint64_
   return impl_->estimate_of(keys);
 }
 
-std::vector<std::uint64_t> IncrementalSolver::take_changed() { return each_once(std::exchange(impl_->changed, {})); }
+std::vector<std::uint64_t> IncrementalSolver::take_changed() {
+  std::vector<std::uint64_t> changed = std::exchange(impl_->changed, {});
+  std::ranges::sort(changed);
+  const auto twice = std::ranges::unique(changed);
+  changed.erase(twice.begin(), twice.end());
+  return changed;
+}
 
 std::vector<std::uint64_t> IncrementalSolver::take_relinearised() {
-  return each_once(std::exchange(impl_->relinearised, {}));
+  std::vector<gtsam::Key> keys(impl_->relinearised.begin(), impl_->relinearised.end());
+  impl_->relinearised.clear();
+  std::ranges::sort(keys);
+  return keys;
 }
 
 const gtsam::Values& IncrementalSolver::linearisation_points() const {
@@ -290,7 +292,7 @@ std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint6
 }
 
 Eigen::MatrixXd IncrementalSolver::relative_covariance(std::span<const KeyPair> pairs) const {
-  if (!impl_->broken.empty()) return {};
+  if (!impl_->broken.empty() || pairs.empty()) return {};
   Isam2::Sum all;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     for (Isam2::Term& term : impl_->relative_terms(pairs[i])) {

@@ -79,6 +79,7 @@ void Isam2::climb(std::span<const Term> terms, auto visit) const {
   };
   for (const Term& term : terms) {
     const int number = number_of_.at(term.key);
+    if (variable(number).clique < 0) continue;  // it has no factors
     Eigen::MatrixXd& first = open_at(variable(number).clique);
     first.middleRows(row_of[static_cast<std::size_t>(number)], dimension(number)) += term.factor.transpose();
   }

@@ -160,18 +160,25 @@ void LocalMap::insert_all(auto points, const Pose& T_odom_body, bool confirmed, 
   }
 }
 
-bool LocalMap::shows_other_face(const Place& place) const {
-  const Block& block = blocks_[static_cast<std::size_t>(place.block)];
-  return (block.occupied >> place.bit & 1U) != 0 && block.voxel(place.bit).view.dot(place.view) < 0.0F;
+std::int32_t LocalMap::block_of_face(const Place& place) {
+  const auto is_taken = [&](const Block& block) { return (block.occupied >> place.bit & 1U) != 0; };
+  const auto agrees = [&](const Block& block) { return block.voxel(place.bit).view.dot(place.view) >= 0.0F; };
+  const Block& first = blocks_[static_cast<std::size_t>(place.block)];
+  if (is_taken(first) && agrees(first)) return place.block;
+  const auto [region, bit] = home_of(first);
+  if (is_taken(first)) {
+    const Eigen::Vector3i coordinate = first.coordinate;
+    return find_or_add_block(coordinate, 1);
+  }
+  // The first may have left the window, the second not.
+  if (!region->has(1, bit)) return place.block;
+  const std::int32_t second = region->blocks[1][bit];
+  const Block& other = blocks_[static_cast<std::size_t>(second)];
+  return is_taken(other) && agrees(other) ? second : place.block;
 }
 
 void LocalMap::insert_point(const Place& place, bool confirmed) {
-  std::int32_t face = place.block;
-  if (two_faces_ && shows_other_face(place)) {
-    const Eigen::Vector3i coordinate = blocks_[static_cast<std::size_t>(place.block)].coordinate;
-    face = find_or_add_block(coordinate, 1);
-  }
-  Block& block = blocks_[static_cast<std::size_t>(face)];
+  Block& block = blocks_[static_cast<std::size_t>(two_faces_ ? block_of_face(place) : place.block)];
   const int bit = place.bit;
   const std::uint64_t flag = std::uint64_t{1} << bit;
   const auto scan = static_cast<float>(scans_);

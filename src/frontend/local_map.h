@@ -29,7 +29,7 @@ namespace ignis {
 /// lines of the cache each: its cost does not depend on the size of the map, and empty space costs nothing.
 ///
 /// Points of scans that contradicted the map enter unconfirmed: they hold their voxel, but have no vote in plane fits
-/// until a scan that agreed puts a point of its own there.
+/// until a scan that agreed puts a point of its own there, or with two faces one that saw it from there.
 class LocalMap {
  public:
   explicit LocalMap(const FrontendConfig& config);
@@ -49,7 +49,8 @@ class LocalMap {
   [[nodiscard]] std::optional<Eigen::Vector3d> nearest(const Eigen::Vector3d& query, double radius) const;
 
   /// The confirmed point (odom, [m]) of the voxel that a point lies in, as seen from the side of a plane that `side`
-  /// points to; nothing where there is none, or fewer measured points are in its mean than `min_points`.
+  /// points to, zero: from any; nothing where there is none, or fewer measured points are in its mean than
+  /// `min_points`.
   [[nodiscard]] std::optional<Eigen::Vector3d> own_voxel(const Eigen::Vector3d& query, float min_points,
                                                          const Eigen::Vector3d& side) const;
 
@@ -155,8 +156,9 @@ class LocalMap {
   /// Index into blocks_.
   [[nodiscard]] std::int32_t find_or_add_block(const Eigen::Vector3i& coordinate, std::uint32_t face);
   void insert_all(auto points, const Pose& T_odom_body, bool confirmed, auto position_of);
-  /// True when the place's voxel is taken by a point that was seen from the other side.
-  [[nodiscard]] bool shows_other_face(const Place& place) const;
+  /// Index into blocks_ of the one whose point of the place's voxel was seen from the same side, else of the first
+  /// that has none, else of the second one.
+  [[nodiscard]] std::int32_t block_of_face(const Place& place);
   void insert_point(const Place& place, bool confirmed);
   void sweep(std::uint64_t blocks);
   void prune(Block& block);

@@ -2,7 +2,6 @@
 #include "frontend/plane_finder.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "frontend/four_planes.h"
 
@@ -13,12 +12,8 @@ namespace {
 // neighbour in three hundred on the other side of a wall of 0.1 m makes as much.
 constexpr double kOneFace = 0.006;
 
-// Sine of the angle to a plane from which on it is clear which side it is seen from. Of what is seen more flatly, a far
-// floor, the normal's error would choose one half of the points.
-constexpr double kClear = 0.1;
-
 bool may_be_two_faces(const PlaneFit& plane, const Eigen::Vector3d& view) {
-  return plane.scatter[0] > kOneFace * kOneFace && std::abs(plane.normal.dot(view)) > kClear * view.norm();
+  return plane.scatter[0] > kOneFace * kOneFace && is_side_clear(plane, view);
 }
 
 }  // namespace

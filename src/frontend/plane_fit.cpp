@@ -42,6 +42,11 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   return fit;
 }
 
+bool is_side_clear(const PlaneFit& plane, const Eigen::Vector3d& view) {
+  constexpr double kFlat = 0.1;  // sine of the angle to the plane
+  return std::abs(plane.normal.dot(view)) > kFlat * view.norm();
+}
+
 bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view) {
   constexpr double kFlat = 0.1;  // rad, angle to the plane at which it was seen on average
   constexpr double kSure = 2.0;  // sigma of the normal

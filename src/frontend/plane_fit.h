@@ -69,6 +69,9 @@ struct PlaneFit {
   return plane.normal.dot(view) > 0.0 ? plane.normal : Eigen::Vector3d(-plane.normal);
 }
 
+/// False where the body sees the plane so flatly that the normal's error may decide on which side it is: a far floor.
+[[nodiscard]] bool is_side_clear(const PlaneFit& plane, const Eigen::Vector3d& view);
+
 /// True when the neighbours were seen from one side of their plane and the body is on the other: they are the far face
 /// of a wall. `view`: vector from the query point to the body [m]. Where the normal's own error decides on which side
 /// the body is, that says nothing; an angle is no measure of it: within a doorway the wall beside it is seen at a few

@@ -137,10 +137,13 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
 }
 
 double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
-                                   const Eigen::Vector3d& seen_from, const LocalMap& map) {
+                                   const Eigen::Vector3d& seen_from, const LocalMap& map) const {
   const double of_all = plane.normal.dot(query + plane.offset);
   if (smoothness == 1.0) return of_all;
-  const std::optional<Eigen::Vector3d> own = map.own_voxel(query, kPointsOfAMean, side_of(plane, seen_from - query));
+  const Eigen::Vector3d view = seen_from - query;
+  const bool has_side = config_.map_two_faces && is_side_clear(plane, view);
+  const std::optional<Eigen::Vector3d> own =
+      map.own_voxel(query, kPointsOfAMean, has_side ? side_of(plane, view) : Eigen::Vector3d::Zero().eval());
   return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
 }
 

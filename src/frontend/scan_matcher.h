@@ -86,8 +86,8 @@ class ScanMatcher {
   /// Where a plane lies along its normal [m]. Of a smooth one all neighbours tell. Where an edge or a corner passes for
   /// a plane, their mean is off to one side, before the edge or behind it, alike in scan after scan: the rougher the
   /// plane, the more is told by the points of the query's own voxel, which lie where the query does.
-  [[nodiscard]] static double distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
-                                             const Eigen::Vector3d& seen_from, const LocalMap& map);
+  [[nodiscard]] double distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
+                                      const Eigen::Vector3d& seen_from, const LocalMap& map) const;
   /// Drops the constraints to surfaces that have moved, where they are among the few that face their way.
   void leave_out_moving_surfaces(int newest_scan);
   /// Drops the constraints to surfaces that the map has held for a moment only, as long as enough is left without them.

@@ -98,6 +98,30 @@ TEST(WallFaces, OfOneVoxelAreTwoPointsOfTheMapThatGoTogether) {
   }
 }
 
+TEST(WallFaces, StayApartWhenTheFirstOneHasLeftTheWindow) {
+  FrontendConfig config = config_with(true);
+  config.map_window_m = 10.0;
+  config.map_memory_m = 100.0;
+  LocalMap map(config);
+  const auto look = [&](float side) {
+    const Eigen::Vector3f body(2.0F * side, 0.05F, 0.05F);
+    const Eigen::Vector3f point = Eigen::Vector3f(0.05F + 0.03F * side, 0.05F, 0.05F) - body;
+    map.insert(std::vector{point}, {Eigen::Quaterniond::Identity(), body.cast<double>()}, true);
+  };
+  for (const float side : {-1.0F, 1.0F, 1.0F}) look(side);
+  ASSERT_EQ(map.size(), 2);
+  map.slide(Eigen::Vector3d::Zero(), 0);
+  for (int i = 0; i < LocalMap::kSlidesToSweep; ++i) map.slide({0.0, 0.0, 50.0}, 2);
+  ASSERT_EQ(map.size(), 1) << "what is of the first scan has gone";
+  for (const float side : {1.0F, -1.0F, 1.0F}) look(side);
+  EXPECT_EQ(map.size(), 2);
+  for (const double side : {-1.0, 1.0}) {
+    const auto own = map.own_voxel({0.05, 0.05, 0.05}, 1.0F, side * Eigen::Vector3d::UnitX());
+    ASSERT_TRUE(own);
+    EXPECT_NEAR(own->x(), 0.05 + 0.03 * side, 1e-6);
+  }
+}
+
 TEST(WallFaces, AreAskedForBySide) {
   const Wall wall(0.06, true);
   for (const double side : {-1.0, 1.0}) {
