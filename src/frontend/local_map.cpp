@@ -165,12 +165,12 @@ std::int32_t LocalMap::block_of_face(const Place& place) {
   const auto agrees = [&](const Block& block) { return block.voxel(place.bit).view.dot(place.view) >= 0.0F; };
   const Block& first = blocks_[static_cast<std::size_t>(place.block)];
   if (is_taken(first) && agrees(first)) return place.block;
-  const auto [region, bit] = home_of(first);
   if (is_taken(first)) {
-    const Eigen::Vector3i coordinate = first.coordinate;
+    const Eigen::Vector3i coordinate = first.coordinate;  // a copy: a new block may move the others
     return find_or_add_block(coordinate, 1);
   }
   // The first may have left the window, the second not.
+  const auto [region, bit] = home_of(first);
   if (!region->has(1, bit)) return place.block;
   const std::int32_t second = region->blocks[1][bit];
   const Block& other = blocks_[static_cast<std::size_t>(second)];

@@ -7,6 +7,11 @@
 #include "frontend/scatter_axes.h"
 
 namespace ignis {
+namespace {
+
+constexpr double kFlat = 0.1;  // sine of the angle at which a plane is seen, below which its side is not clear
+
+}  // namespace
 
 PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config, double radius) {
   PlaneFit fit;
@@ -43,12 +48,10 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
 }
 
 bool is_side_clear(const PlaneFit& plane, const Eigen::Vector3d& view) {
-  constexpr double kFlat = 0.1;  // sine of the angle to the plane
   return std::abs(plane.normal.dot(view)) > kFlat * view.norm();
 }
 
 bool is_seen_from_other_side(const PlaneFit& plane, const Eigen::Vector3d& view) {
-  constexpr double kFlat = 0.1;  // rad, angle to the plane at which it was seen on average
   constexpr double kSure = 2.0;  // sigma of the normal
   // From the plane and not from the query point, which the thickness of a wall sets apart from it.
   const Eigen::Vector3d from_plane = view - plane.offset;

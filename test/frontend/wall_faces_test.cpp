@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "frontend/local_map.h"
 #include "frontend/plane_finder.h"
@@ -24,7 +25,14 @@ FrontendConfig config_with(bool two_faces) {
   return config;
 }
 
-/// A wall across x whose middle is 0.05, driven by on the side of `body` first and on the other one then.
+/// Puts one point of a wall of 0.06 m into a map, all in one voxel, as seen from 2 m beside it.
+void look_once(LocalMap& map, float side) {
+  const Eigen::Vector3f body(2.0F * side, 0.05F, 0.05F);
+  const Eigen::Vector3f point = Eigen::Vector3f(0.05F + 0.03F * side, 0.05F, 0.05F) - body;
+  map.insert(std::vector{point}, {Eigen::Quaterniond::Identity(), body.cast<double>()}, true);
+}
+
+/// A wall across x whose middle is at 0.05 m, passed on the side of negative x first and on the other one then.
 class Wall {
  public:
   Wall(double thickness, bool two_faces) : config(config_with(two_faces)), map(config), half_(0.5 * thickness) {
@@ -84,11 +92,7 @@ TEST(WallFaces, AreFoundWhereTheyAreHoweverThinTheWall) {
 TEST(WallFaces, OfOneVoxelAreTwoPointsOfTheMapThatGoTogether) {
   for (const bool two_faces : {true, false}) {
     LocalMap map(config_with(two_faces));
-    for (const float side : {-1.0F, 1.0F, -1.0F}) {
-      const Eigen::Vector3f body(2.0F * side, 0.05F, 0.05F);
-      const Eigen::Vector3f point = Eigen::Vector3f(0.05F + 0.03F * side, 0.05F, 0.05F) - body;
-      map.insert(std::vector{point}, {Eigen::Quaterniond::Identity(), body.cast<double>()}, true);
-    }
+    for (const float side : {-1.0F, 1.0F, -1.0F}) look_once(map, side);
     EXPECT_EQ(map.size(), two_faces ? 2 : 1);
     EXPECT_EQ(map.points().size(), static_cast<std::size_t>(map.size()));
     map.slide(Eigen::Vector3d::Zero(), 0);
@@ -103,17 +107,12 @@ TEST(WallFaces, StayApartWhenTheFirstOneHasLeftTheWindow) {
   config.map_window_m = 10.0;
   config.map_memory_m = 100.0;
   LocalMap map(config);
-  const auto look = [&](float side) {
-    const Eigen::Vector3f body(2.0F * side, 0.05F, 0.05F);
-    const Eigen::Vector3f point = Eigen::Vector3f(0.05F + 0.03F * side, 0.05F, 0.05F) - body;
-    map.insert(std::vector{point}, {Eigen::Quaterniond::Identity(), body.cast<double>()}, true);
-  };
-  for (const float side : {-1.0F, 1.0F, 1.0F}) look(side);
+  for (const float side : {-1.0F, 1.0F, 1.0F}) look_once(map, side);
   ASSERT_EQ(map.size(), 2);
   map.slide(Eigen::Vector3d::Zero(), 0);
   for (int i = 0; i < LocalMap::kSlidesToSweep; ++i) map.slide({0.0, 0.0, 50.0}, 2);
   ASSERT_EQ(map.size(), 1) << "what is of the first scan has gone";
-  for (const float side : {1.0F, -1.0F, 1.0F}) look(side);
+  for (const float side : {1.0F, -1.0F, 1.0F}) look_once(map, side);
   EXPECT_EQ(map.size(), 2);
   for (const double side : {-1.0, 1.0}) {
     const auto own = map.own_voxel({0.05, 0.05, 0.05}, 1.0F, side * Eigen::Vector3d::UnitX());
