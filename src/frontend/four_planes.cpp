@@ -190,6 +190,7 @@ void fit_four_planes(const FourMoments& moments, const FrontendConfig& config, d
     fit.offset = lane_of(offset, k);
     fit.normal_sigma << lane_of(sigma_1, k), lane_of(sigma_2, k);
     fit.count = static_cast<int>(moments.count[k]);
+    fit.points = moments.weight[k];
     fit.scatter << lambda[0][k], lambda[1][k], lambda[2][k];
     fit.mean_scan = mean_scan[k];
     fit.view = lane_of(view, k);

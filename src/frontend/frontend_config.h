@@ -74,6 +74,8 @@ struct FrontendConfig {
   int min_scan_points = 50;
   int min_matches = 20;
   double smooth_plane_m = 0.0;
+  double enough_smooth_planes = 0.0;
+  double range_noise_m = 0.0;
   double shock_accel_m_s2 = 30.0;
   double shock_gyro_rad_s = 5.0;
   double map_memory_m = 20.0;
@@ -226,6 +228,11 @@ struct FrontendConfig {
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
     visit.number("smooth_plane_m", self.smooth_plane_m, {0.0, 1.0}, "m",
                  "a plane of this roughness counts half as much as a perfect one; 0: all count alike");
+    visit.number(
+        "enough_smooth_planes", self.enough_smooth_planes, {0.0, 1e4}, "planes",
+        "where so many smooth planes hold a direction, rough ones count for half or less of that; 0: always all");
+    visit.number("range_noise_m", self.range_noise_m, {0.0, 1.0}, "m",
+                 "noise of a measured point, which is no roughness of the plane that it lies on");
     visit.number("shock_accel_m_s2", self.shock_accel_m_s2, {0.0, 1000.0}, "m/s^2",
                  "a sample that differs from gravity by more is a shock, believed as little as a clipped one; 0: none");
     visit.number("shock_gyro_rad_s", self.shock_gyro_rad_s, {0.0, 100.0}, "rad/s",

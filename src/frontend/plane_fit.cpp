@@ -24,6 +24,7 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   const Eigen::Vector3d lambda = axes.values.cwiseMax(0.0);
   fit.normal = axes.vectors.col(0);
   fit.count = moments.count;
+  fit.points = moments.weight;
   fit.scatter = lambda;
   fit.mean_scan = moments.scan_sum * inverse_weight;
   fit.view = moments.view_sum * inverse_weight;

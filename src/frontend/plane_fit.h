@@ -48,6 +48,7 @@ struct PlaneFit {
   /// scatter: variance of the slope of a least-squares plane = scatter across / (count x spread along).
   Eigen::Matrix<double, 3, 2> normal_sigma = Eigen::Matrix<double, 3, 2>::Zero();
   int count = 0;                                      ///< neighbours
+  double points = 0.0;                                ///< measured points that these are the means of
   Eigen::Vector3d scatter = Eigen::Vector3d::Zero();  ///< [m^2] their variance across the plane and in it, ascending
   double mean_scan = 0.0;  ///< [scans] mean number of the scans that the neighbours come from
   Eigen::Vector3d view =

@@ -8,6 +8,7 @@
 
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
+#include "frontend/rough_planes.h"
 #include "frontend/square_sum.h"
 
 namespace ignis {
@@ -115,13 +116,15 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       const PlaneFit& plane = planes[i];
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
-      const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
+      const double variance = unexplained_variance(plane, config_.range_noise_m);
+      const double smoothness = plane_smoothness(variance, config_.smooth_plane_m);
       const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);
       constraints_.push_back({point_body, plane, distance, smoothness, 1.0});
     }
   }
   leave_out_moving_surfaces(map.scans());
   leave_out_new_surfaces(map.scans());
+  if (config_.enough_smooth_planes > 0.0) weigh_rough_planes();
   double range_sum = 0.0;
   double scan_sum = 0.0;
   double variance_sum = 0.0;
@@ -136,15 +139,25 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   pooled_variance_ = variance_sum / count;
 }
 
+void ScanMatcher::weigh_rough_planes() {
+  SmoothSupport support(config_.enough_smooth_planes);
+  for (const Constraint& constraint : constraints_) support.add(constraint.plane.normal, constraint.smoothness);
+  support.finish();
+  for (Constraint& constraint : constraints_) {
+    constraint.smoothness = support.weight(constraint.plane.normal, constraint.smoothness);
+  }
+}
+
 double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
                                    const Eigen::Vector3d& seen_from, const LocalMap& map) const {
   const double of_all = plane.normal.dot(query + plane.offset);
   if (smoothness == 1.0) return of_all;
+  const double share_of_all = config_.enough_smooth_planes > 0.0 ? strict_smoothness(smoothness) : smoothness;
   const Eigen::Vector3d view = seen_from - query;
   const bool has_side = config_.map_two_faces && is_side_clear(plane, view);
   const std::optional<Eigen::Vector3d> own =
       map.own_voxel(query, kPointsOfAMean, has_side ? side_of(plane, view) : Eigen::Vector3d::Zero().eval());
-  return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
+  return own ? of_all + (1.0 - share_of_all) * (plane.normal.dot(*own) - of_all) : of_all;
 }
 
 void ScanMatcher::expect(const FilterState& predicted) {

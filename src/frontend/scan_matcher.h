@@ -69,7 +69,7 @@ class ScanMatcher {
     Eigen::Vector3d point_body;
     PlaneFit plane;         ///< odom axes
     double plane_distance;  ///< [m] of the plane from the origin of odom, along its normal
-    double smoothness;      ///< of the plane, (0, 1]
+    double smoothness;      ///< of the plane, (0, 1]; where smooth planes suffice, little of a rough one
     double weight;          ///< this times the observability weight
   };
   struct Assessment {
@@ -95,6 +95,8 @@ class ScanMatcher {
   /// a forklift that goes by can be most of what faces along the way, and it says what its own speed is. What stands is
   /// new only when it has just come into sight. A vehicle that does not know its own speed sees all that stands move.
   void leave_out_new_surfaces(int newest_scan);
+  /// Makes rough planes count less where smooth ones hold the same direction, see SmoothSupport.
+  void weigh_rough_planes();
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);
   void weigh(const Eigen::Vector3d& observability);

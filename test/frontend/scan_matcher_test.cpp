@@ -105,11 +105,13 @@ TEST_F(CorridorEnd, IsTakenForChanceBelowTheShareThatIsAskedFor) {
   EXPECT_EQ(match().salient.constraints.count, 0);
 }
 
-/// A floor of squares of a metre, every other one of which is rough and was mapped too high.
+/// A floor of squares of a metre, every other one of which, or each, is rough and was mapped too high.
 struct Patches {
   double smooth_plane_m = 0.005;
+  double enough_smooth_planes = 0.0;
   float too_high = 0.03F;  ///< [m]
   float noise = 0.0F;      ///< [m] of the points that are matched with it, up and down in turn
+  bool all_rough = false;
 };
 
 /// Calls visit(x, z, i, k) for a grid of 5 cm over 4 m x 4 m.
@@ -121,10 +123,11 @@ void for_each_point_of_a_floor(auto&& visit) {
 }
 
 /// What a standing sensor makes of points that it sees of what it has mapped in forty scans.
-MatchResult match_at_rest(double smooth_plane_m, std::span<const Eigen::Vector3f> mapped,
+MatchResult match_at_rest(double smooth_plane_m, double enough_smooth_planes, std::span<const Eigen::Vector3f> mapped,
                           std::span<const Eigen::Vector3f> seen, double prior_variance) {
   FrontendConfig config = test::tuned_config();
   config.smooth_plane_m = smooth_plane_m;
+  config.enough_smooth_planes = enough_smooth_planes;
   LocalMap map(config);
   for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
   FilterState predicted;
@@ -141,18 +144,32 @@ MatchResult match_over(const Patches& patches) {
   std::vector<Eigen::Vector3f> mapped;
   std::vector<Eigen::Vector3f> seen;
   for_each_point_of_a_floor([&](float x, float z, int i, int k) {
-    const bool rough = (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(z))) % 2 != 0;
+    const bool rough =
+        patches.all_rough || (static_cast<int>(std::floor(x)) + static_cast<int>(std::floor(z))) % 2 != 0;
     const bool high = (static_cast<int>(std::floor(x / 0.1F)) + static_cast<int>(std::floor(z / 0.1F))) % 2 != 0;
     mapped.emplace_back(x, rough ? patches.too_high + (high ? -0.98F : -1.02F) : -1.0F, z);
     seen.emplace_back(x, -1.0F + ((i + k) % 2 != 0 ? patches.noise : -patches.noise), z);
   });
-  return match_at_rest(patches.smooth_plane_m, mapped, seen, 1e-4);
+  return match_at_rest(patches.smooth_plane_m, patches.enough_smooth_planes, mapped, seen, 1e-4);
 }
 
 TEST(RoughPlanes, CountForLittleWhereThereAreSmoothOnes) {
   const double all_alike = height(match_over({.smooth_plane_m = 0.0}));
   EXPECT_GT(all_alike, 0.005);
   EXPECT_LT(std::abs(height(match_over({}))), 0.3 * all_alike);
+}
+
+TEST(RoughPlanes, CountForNextToNothingWhereSmoothOnesSuffice) {
+  const double by_smoothness = height(match_over({.smooth_plane_m = 0.013}));
+  EXPECT_GT(by_smoothness, 0.003);
+  EXPECT_LT(std::abs(height(match_over({.smooth_plane_m = 0.013, .enough_smooth_planes = 6.0}))), 0.3 * by_smoothness);
+}
+
+TEST(RoughPlanes, AreHeardWhereTheyAreAllThatFacesTheWay) {
+  const double by_smoothness = height(match_over({.smooth_plane_m = 0.005, .all_rough = true}));
+  EXPECT_GT(by_smoothness, 0.01);
+  const double needed = height(match_over({.smooth_plane_m = 0.005, .enough_smooth_planes = 6.0, .all_rough = true}));
+  EXPECT_GT(needed, 0.9 * by_smoothness);
 }
 
 TEST(RoughPlanes, DoNotMakeTheSmoothOnesPassForNoisy) {
@@ -172,7 +189,7 @@ double height_over_strips(double smooth_plane_m) {
     mapped.emplace_back(x, low ? -1.0F : -0.96F, z);
     if (low) seen.push_back(mapped.back());
   });
-  return height(match_at_rest(smooth_plane_m, mapped, seen, 1e-2));
+  return height(match_at_rest(smooth_plane_m, 0.0, mapped, seen, 1e-2));
 }
 
 TEST(RoughPlanes, LieWhereTheVoxelOfThePointSaysAndNotWhereItsNeighboursDo) {

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/rough_planes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace ignis {
+namespace {
+
+constexpr double kNoise = 0.02;  // m, of a measured point
+const Eigen::Vector3d kAlong = -Eigen::Vector3d::UnitZ();
+const Eigen::Vector3d kAcross = Eigen::Vector3d::UnitX();
+const Eigen::Vector3d kUp = Eigen::Vector3d::UnitY();
+
+/// Mean over many planes of three by three voxels, of one to nine points each, of what noise leaves unexplained,
+/// signed: the fit's variance across less what is said of it. `step`: by how much every other row is higher [m].
+double mean_excess(double step) {
+  FrontendConfig config;
+  config.max_curvature = 1.0;
+  config.max_surface_roughness = 1.0;
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, kNoise);
+  std::uniform_int_distribution<int> points(1, 9);
+  double sum = 0.0;
+  constexpr int kPlanes = 4000;
+  for (int plane = 0; plane < kPlanes; ++plane) {
+    NeighbourMoments moments;
+    for (int i = -1; i <= 1; ++i) {
+      for (int k = -1; k <= 1; ++k) {
+        const int count = points(random);
+        const double height = (i == 0 ? step : 0.0) + noise(random) / std::sqrt(count);
+        moments.add({.offset = {0.1 * i, height, 0.1 * k}, .weight = static_cast<double>(count)});
+      }
+    }
+    const PlaneFit fit = fit_plane(moments, config, 0.2);
+    // What is below zero is cut off there: the noise that explains the whole variance is looked for instead.
+    double low = 0.0;
+    double high = 1.0;
+    for (int halving = 0; halving < 40; ++halving) {
+      const double middle = 0.5 * (low + high);
+      (unexplained_variance(fit, middle) > 0.0 ? low : high) = middle;
+    }
+    sum += low * low;
+  }
+  return sum / kPlanes - kNoise * kNoise;
+}
+
+TEST(RoughPlanes, NoiseOfTheirPointsIsNoRoughness) {
+  EXPECT_NEAR(mean_excess(0.0), 0.0, 0.04 * kNoise * kNoise);
+  EXPECT_GT(mean_excess(0.03), kNoise * kNoise);
+}
+
+TEST(RoughPlanes, AreAsRoughAsTheyLookWhereNoiseIsUnknown) {
+  PlaneFit fit;
+  fit.count = 9;
+  fit.points = 9.0;
+  fit.scatter = {1e-4, 1e-2, 1e-2};
+  EXPECT_DOUBLE_EQ(unexplained_variance(fit, 0.0), 1e-4);
+}
+
+SmoothSupport support_of(int along, int across, double smoothness = 1.0) {
+  SmoothSupport support(6.0);
+  for (int i = 0; i < along; ++i) support.add(kAlong, smoothness);
+  for (int i = 0; i < across; ++i) support.add(kAcross, smoothness);
+  for (int i = 0; i < 200; ++i) support.add(kUp, smoothness);
+  support.finish();
+  return support;
+}
+
+TEST(SmoothSupport, LeavesRoughPlanesTheirWeightWhereNothingElseFacesTheWay) {
+  EXPECT_NEAR(support_of(0, 200).weight(kAlong, 0.3), 0.3, 0.001);
+}
+
+TEST(SmoothSupport, LeavesThemHalfOfWhatIsToBeLostWhereSmoothOnesJustSuffice) {
+  EXPECT_NEAR(support_of(6, 200).weight(kAlong, 0.3), 0.5 * (0.3 + strict_smoothness(0.3)), 0.001);
+}
+
+TEST(SmoothSupport, LeavesThemNextToNothingWhereSmoothOnesHoldTheWay) {
+  const SmoothSupport support = support_of(200, 200);
+  EXPECT_LT(support.weight(kAlong, 0.3), 0.02);
+  EXPECT_DOUBLE_EQ(support.weight(kAlong, 1.0), 1.0);
+}
+
+TEST(SmoothSupport, AsksForTheWeakestPartOfAnObliqueNormal) {
+  const Eigen::Vector3d oblique = (kAlong + kAcross).normalized();
+  EXPECT_GT(support_of(0, 200).weight(oblique, 0.3), 0.29);
+  EXPECT_LT(support_of(200, 200).weight(oblique, 0.3), 0.02);
+}
+
+TEST(SmoothSupport, DoesNotTakeRoughPlanesForSmoothOnes) {
+  EXPECT_GT(support_of(200, 200, 0.2).weight(kAlong, 0.3), 0.25);
+}
+
+}  // namespace
+}  // namespace ignis
