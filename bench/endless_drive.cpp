@@ -2,7 +2,7 @@
 //
 // endless_drive: front end, back end with its journal, and map over simulated hours of a drive whose laps repeat, in
 // one thread and as fast as it goes: what a day costs, and what grows. One CSV row for each hour; times in ms of
-// processor time, memory in MB.
+// processor time, memory in MB; scans and times are of the hour, all else since the beginning.
 //
 //     ninja -C build/release endless_drive
 //     build/release/bin/endless_drive LAPS.lcm --config config/ignis8_tuned.json --hours 24 --journal FOLDER
@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <format>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -96,12 +97,14 @@ class Drive {
   /// What became of the hour that has just ended.
   std::string tell(int hour) {
     const SmootherStats stats = graph_.smoother().stats();
+    const double live = live_mb();  // before the row's own lists
+    const double resident = bench::resident_bytes() / 1e6;
     const std::string row = std::format(
         "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f},{:.1f},{:.1f},{},{:.4f},{:.4f}", hour, sessions_,
         scans_, not_applied_, scan_times_.tell(), stats.keyframes, refused_, stats.loops_kept, stats.loops_on_trial,
         stats.loops_waiting, stats.loops_withdrawn, update_times_.tell(), batch_times_.tell(), stats.shadow_swaps,
-        map_times_.tell(), map_.rebuilds(), live_mb(), graph_mb_, bench::resident_bytes() / 1e6, map_.clouds().size(),
-        bench::aligned_error(odometry_, truth_), bench::aligned_error(smoothed(), truth_));
+        map_times_.tell(), map_.rebuilds(), live, graph_mb_, resident, map_.clouds().size(),
+        error_of(odometry_), error_of(smoothed()));
     scans_ = 0;
     not_applied_ = 0;
     return row;
@@ -135,7 +138,9 @@ class Drive {
   void follow_session(std::int32_t session) {
     if (session == graph_.session()) return;
     ++sessions_;
+    const double before = live_mb();
     graph_.begin_session(session);
+    graph_mb_ += live_mb() - before;
     schedule_ = {};
     map_.clear();
     odometry_.clear();
@@ -144,11 +149,12 @@ class Drive {
 
   void take_keyframe(const Keyframe& keyframe) {
     map_.add_keyframe(keyframe);
-    const double before = live_mb();
     adopt_due_optimum();
+    const double before = live_mb();
     const SmootherUpdate update = timed(update_times_, [&] {
       return graph_.change([&](Smoother& smoother) { return smoother.add_keyframe(keyframe); });
     });
+    graph_mb_ += live_mb() - before;
     graph_.maintain();
     if (update.accepted()) {
       odometry_.push_back(keyframe.state.T_odom_body);
@@ -157,17 +163,19 @@ class Drive {
     } else {
       ++refused_;
     }
-    graph_mb_ += live_mb() - before;
   }
 
   void adopt_due_optimum() {
     if (!schedule_.adoption_due(graph_.smoother().stats().keyframes)) return;
     schedule_.end();
     const ShadowOptimum optimum = timed(batch_times_, [&] { return solve(std::exchange(problem_, {})); });
-    publish(graph_.change([&](Smoother& smoother) { return smoother.adopt(optimum); }));
+    const int swaps = graph_.smoother().stats().shadow_swaps;
+    const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(optimum); });
+    if (graph_.smoother().stats().shadow_swaps != swaps) publish(update);
   }
 
   void publish(const SmootherUpdate& update) {
+    if (update.loop && update.loop->accepted()) map_.add_loop(update.loop->from_id, update.loop->to_id);
     std::vector<CorrectedPose> poses;
     for (const KeyframePose& pose : update.moved) poses.push_back({pose.id, pose.T_map_body});
     map_.correct(update.T_map_odom, poses, update.revision);
@@ -179,6 +187,10 @@ class Drive {
 
   void rebuild_map() {
     if (map_.needs_rebuild()) map_.finish_rebuild(rebuild(map_.begin_rebuild()));
+  }
+
+  [[nodiscard]] double error_of(const std::vector<Pose>& poses) const {
+    return poses.empty() ? 0.0 : bench::aligned_error(poses, truth_);
   }
 
   [[nodiscard]] std::vector<Pose> smoothed() const {

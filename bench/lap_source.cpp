@@ -2,7 +2,9 @@
 #include "lap_source.h"
 
 #include <algorithm>
-#include <cmath>
+#include <iterator>
+#include <stdexcept>
+#include <utility>
 
 #include "runtime/application.h"
 
@@ -19,10 +21,19 @@ bool is_same(const Pose& a, const Pose& b) {
   return (a.translation - b.translation).norm() < kSamePlace && a.rotation.angularDistance(b.rotation) < kSameCourse;
 }
 
+ReplayInput open(const std::filesystem::path& log) {
+  try {
+    return ReplayInput(log);
+  } catch (const std::runtime_error& error) {
+    throw runtime::UserError(error.what());
+  }
+}
+
 }  // namespace
 
-LapSource::LapSource(const std::filesystem::path& log) : input_(log) {
+LapSource::LapSource(const std::filesystem::path& log) : input_(open(log)) {
   const Trajectory& truth = input_.ground_truth();
+  if (truth.empty()) throw runtime::UserError(log.string() + ": has no GROUND_TRUTH to find the laps by");
   first_ = input_.inventory().first_utime;
   for (std::size_t i = 0; i < truth.size() && end_ == 0; ++i) {
     if (truth[i].utime < first_ + to_micros(kSettled)) continue;
@@ -60,8 +71,12 @@ void LapSource::run(double seconds, const std::function<void(const ImuSample&)>&
 Pose LapSource::truth_at(Utime utime) const {
   const Utime recorded = utime < end_ ? utime : begin_ + (utime - begin_) % (end_ - begin_);
   const Trajectory& truth = input_.ground_truth();
-  const auto at = std::ranges::lower_bound(truth, recorded, {}, &StampedPose::utime);
-  return at == truth.end() ? truth.back().T_world_body : at->T_world_body;
+  const auto after = std::ranges::lower_bound(truth, recorded, {}, &StampedPose::utime);
+  if (after == truth.begin()) return truth.front().T_world_body;
+  if (after == truth.end()) return truth.back().T_world_body;
+  const StampedPose& before = *std::prev(after);
+  return interpolate(before.T_world_body, after->T_world_body,
+                     seconds_between(before.utime, recorded) / seconds_between(before.utime, after->utime));
 }
 
 }  // namespace ignis::bench

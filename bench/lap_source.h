@@ -14,7 +14,7 @@ namespace ignis::bench {
 /// GROUND_TRUTH, and a way that comes by a place of its first seconds once more near its end, on the same course.
 class LapSource {
  public:
-  /// Throws runtime::UserError when the drive never comes back, or the log cannot be read.
+  /// Throws runtime::UserError when the log cannot be read, has no GROUND_TRUTH, or the drive never comes back.
   explicit LapSource(const std::filesystem::path& log);
 
   /// Calls the handlers with every measurement, in time order, until `seconds` of the sensor's time have gone by or

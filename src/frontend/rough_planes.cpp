@@ -3,12 +3,12 @@
 
 #include <algorithm>
 
-#include <Eigen/LU>
+#include <Eigen/Eigenvalues>
 
 namespace ignis {
 namespace {
 
-constexpr double kHardlyAny = 1e-3;  // planes: keeps the sum invertible where nothing faces a direction
+constexpr double kHardlyAny = 1e-3;  // planes: what a direction that nothing faces is taken to be held by
 
 }  // namespace
 
@@ -26,13 +26,17 @@ void SmoothSupport::add(const Eigen::Vector3d& normal, double smoothness) {
   planes_ += strict_smoothness(smoothness) * normal * normal.transpose();
 }
 
-void SmoothSupport::finish() { looseness_ = (planes_ + kHardlyAny * Eigen::Matrix3d::Identity()).inverse(); }
+void SmoothSupport::finish() {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(planes_);
+  directions_ = solver.eigenvectors();
+  held_ = solver.eigenvalues().cwiseMax(kHardlyAny);
+}
 
 double SmoothSupport::weight(const Eigen::Vector3d& normal, double smoothness) const {
-  // The information that the planes have of a shift along the normal while the other directions are free: what they
-  // hold of an oblique one is no more than what they hold of its weakest part.
-  const double holding = 1.0 / normal.dot(looseness_ * normal);
-  const double need = enough_ / (enough_ + holding);
+  // The information that the planes have of a shift along the normal while the other directions are free, 1 / (n^T A^-1
+  // n): what they hold of an oblique one is no more than what they hold of its weakest part.
+  const double loose = (directions_.transpose() * normal).cwiseAbs2().cwiseQuotient(held_).sum();
+  const double need = enough_ * loose / (enough_ * loose + 1.0);
   const double strict = strict_smoothness(smoothness);
   return strict + need * (smoothness - strict);
 }

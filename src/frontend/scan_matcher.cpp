@@ -119,7 +119,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       const double variance = unexplained_variance(plane, config_.range_noise_m);
       const double smoothness = plane_smoothness(variance, config_.smooth_plane_m);
       const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);
-      constraints_.push_back({point_body, plane, distance, smoothness, 1.0});
+      constraints_.push_back({point_body, plane, distance, smoothness, smoothness, 1.0});
     }
   }
   leave_out_moving_surfaces(map.scans());
@@ -144,7 +144,7 @@ void ScanMatcher::weigh_rough_planes() {
   for (const Constraint& constraint : constraints_) support.add(constraint.plane.normal, constraint.smoothness);
   support.finish();
   for (Constraint& constraint : constraints_) {
-    constraint.smoothness = support.weight(constraint.plane.normal, constraint.smoothness);
+    constraint.hearing = support.weight(constraint.plane.normal, constraint.smoothness);
   }
 }
 
@@ -152,12 +152,11 @@ double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, con
                                    const Eigen::Vector3d& seen_from, const LocalMap& map) const {
   const double of_all = plane.normal.dot(query + plane.offset);
   if (smoothness == 1.0) return of_all;
-  const double share_of_all = config_.enough_smooth_planes > 0.0 ? strict_smoothness(smoothness) : smoothness;
   const Eigen::Vector3d view = seen_from - query;
   const bool has_side = config_.map_two_faces && is_side_clear(plane, view);
   const std::optional<Eigen::Vector3d> own =
       map.own_voxel(query, kPointsOfAMean, has_side ? side_of(plane, view) : Eigen::Vector3d::Zero().eval());
-  return own ? of_all + (1.0 - share_of_all) * (plane.normal.dot(*own) - of_all) : of_all;
+  return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
 }
 
 void ScanMatcher::expect(const FilterState& predicted) {
@@ -217,7 +216,7 @@ void ScanMatcher::weigh(const Eigen::Vector3d& observability) {
       if (std::abs(constraint.plane.normal[axis]) > kTouch) weakest = std::min(weakest, observability[axis]);
     }
     const double share = full > 0.0 ? std::max(weakest / full, config_.min_observability) : 1.0;
-    constraint.weight = share * constraint.smoothness;
+    constraint.weight = share * constraint.hearing;
   }
 }
 

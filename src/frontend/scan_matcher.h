@@ -69,8 +69,9 @@ class ScanMatcher {
     Eigen::Vector3d point_body;
     PlaneFit plane;         ///< odom axes
     double plane_distance;  ///< [m] of the plane from the origin of odom, along its normal
-    double smoothness;      ///< of the plane, (0, 1]; where smooth planes suffice, little of a rough one
-    double weight;          ///< this times the observability weight
+    double smoothness;      ///< of the plane, (0, 1]: the share of a smooth one's information that it has by itself
+    double hearing;         ///< the same, less where smooth planes suffice
+    double weight;          ///< that times the observability weight
   };
   struct Assessment {
     double mean_innovation = 0.0;      ///< [m]

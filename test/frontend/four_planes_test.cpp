@@ -104,6 +104,7 @@ TEST(FourPlanes, EqualTheSingleFitOfEveryNeighbourhood) {
       ++seen[static_cast<std::size_t>(expected.verdict)];
       ASSERT_EQ(fits[k].verdict, expected.verdict) << expected.scatter.transpose();
       ASSERT_EQ(fits[k].count, expected.verdict == PlaneVerdict::kTooFewPoints ? 0 : expected.count);
+      ASSERT_NEAR(fits[k].points, expected.points, 1e-6 * expected.points);
       if (expected.verdict != PlaneVerdict::kPlane) continue;
       const double sign = fits[k].normal.dot(expected.normal) > 0.0 ? 1.0 : -1.0;
       const double rounding = 1e-8 / expected.scatter[1];  // of the moments, which are those of offsets of 0.2 m

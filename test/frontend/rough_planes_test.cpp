@@ -14,8 +14,8 @@ const Eigen::Vector3d kAlong = -Eigen::Vector3d::UnitZ();
 const Eigen::Vector3d kAcross = Eigen::Vector3d::UnitX();
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitY();
 
-/// Mean over many planes of three by three voxels, of one to nine points each, of what noise leaves unexplained,
-/// signed: the fit's variance across less what is said of it. `step`: by how much every other row is higher [m].
+/// Mean over many planes of three by three voxels, of one to nine points each, of the variance of a point that would
+/// explain how rough they are, less the true one [m^2]. `step`: by how much the middle row is higher [m].
 double mean_excess(double step) {
   FrontendConfig config;
   config.max_curvature = 1.0;
@@ -35,7 +35,7 @@ double mean_excess(double step) {
       }
     }
     const PlaneFit fit = fit_plane(moments, config, 0.2);
-    // What is below zero is cut off there: the noise that explains the whole variance is looked for instead.
+    // What is unexplained is never negative, so its mean would be too large without any step.
     double low = 0.0;
     double high = 1.0;
     for (int halving = 0; halving < 40; ++halving) {
@@ -47,12 +47,12 @@ double mean_excess(double step) {
   return sum / kPlanes - kNoise * kNoise;
 }
 
-TEST(RoughPlanes, NoiseOfTheirPointsIsNoRoughness) {
+TEST(UnexplainedVariance, IsNoneWhereNoiseOfThePointsIsAll) {
   EXPECT_NEAR(mean_excess(0.0), 0.0, 0.04 * kNoise * kNoise);
   EXPECT_GT(mean_excess(0.03), kNoise * kNoise);
 }
 
-TEST(RoughPlanes, AreAsRoughAsTheyLookWhereNoiseIsUnknown) {
+TEST(UnexplainedVariance, IsTheWholeOneWhereNoiseIsUnknown) {
   PlaneFit fit;
   fit.count = 9;
   fit.points = 9.0;
@@ -73,11 +73,11 @@ TEST(SmoothSupport, LeavesRoughPlanesTheirWeightWhereNothingElseFacesTheWay) {
   EXPECT_NEAR(support_of(0, 200).weight(kAlong, 0.3), 0.3, 0.001);
 }
 
-TEST(SmoothSupport, LeavesThemHalfOfWhatIsToBeLostWhereSmoothOnesJustSuffice) {
+TEST(SmoothSupport, LeavesRoughPlanesHalfOfWhatIsToBeLostWhereSmoothOnesJustSuffice) {
   EXPECT_NEAR(support_of(6, 200).weight(kAlong, 0.3), 0.5 * (0.3 + strict_smoothness(0.3)), 0.001);
 }
 
-TEST(SmoothSupport, LeavesThemNextToNothingWhereSmoothOnesHoldTheWay) {
+TEST(SmoothSupport, LeavesRoughPlanesNextToNothingWhereSmoothOnesHoldTheWay) {
   const SmoothSupport support = support_of(200, 200);
   EXPECT_LT(support.weight(kAlong, 0.3), 0.02);
   EXPECT_DOUBLE_EQ(support.weight(kAlong, 1.0), 1.0);
@@ -87,6 +87,15 @@ TEST(SmoothSupport, AsksForTheWeakestPartOfAnObliqueNormal) {
   const Eigen::Vector3d oblique = (kAlong + kAcross).normalized();
   EXPECT_GT(support_of(0, 200).weight(oblique, 0.3), 0.29);
   EXPECT_LT(support_of(200, 200).weight(oblique, 0.3), 0.02);
+}
+
+TEST(SmoothSupport, HoldsHoweverManyPlanesFaceOneWay) {
+  SmoothSupport support(6.0);
+  const Eigen::Vector3d oblique = Eigen::Vector3d(0.3, -0.7, 0.2).normalized();
+  for (int i = 0; i < 200'000; ++i) support.add(oblique, 1.0);
+  support.finish();
+  EXPECT_NEAR(support.weight(oblique, 0.3), strict_smoothness(0.3), 1e-3);
+  EXPECT_NEAR(support.weight(oblique.unitOrthogonal(), 0.3), 0.3, 1e-3);
 }
 
 TEST(SmoothSupport, DoesNotTakeRoughPlanesForSmoothOnes) {
