@@ -228,9 +228,9 @@ struct FrontendConfig {
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
     visit.number("smooth_plane_m", self.smooth_plane_m, {0.0, 1.0}, "m",
                  "a plane of this roughness counts half as much as a perfect one; 0: all count alike");
-    visit.number(
-        "enough_smooth_planes", self.enough_smooth_planes, {0.0, 1e4}, "planes",
-        "where so many smooth planes hold a direction, rough ones count for half or less of that; 0: always all");
+    visit.number("enough_smooth_planes", self.enough_smooth_planes, {0.0, 1e4}, "planes",
+                 "where smooth planes amount to so many, a rough one counts half way between its smoothness and the "
+                 "fourth power of it; 0: by its smoothness");
     visit.number("range_noise_m", self.range_noise_m, {0.0, 1.0}, "m",
                  "noise of a measured point, which is no roughness of the plane that it lies on");
     visit.number("shock_accel_m_s2", self.shock_accel_m_s2, {0.0, 1000.0}, "m/s^2",
