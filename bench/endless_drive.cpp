@@ -99,12 +99,12 @@ class Drive {
     const SmootherStats stats = graph_.smoother().stats();
     const double live = live_mb();  // before the row's own lists
     const double resident = bench::resident_bytes() / 1e6;
-    const std::string row = std::format(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f},{:.1f},{:.1f},{},{:.4f},{:.4f}", hour, sessions_,
-        scans_, not_applied_, scan_times_.tell(), stats.keyframes, refused_, stats.loops_kept, stats.loops_on_trial,
-        stats.loops_waiting, stats.loops_withdrawn, update_times_.tell(), batch_times_.tell(), stats.shadow_swaps,
-        map_times_.tell(), map_.rebuilds(), live, graph_mb_, resident, map_.clouds().size(),
-        error_of(odometry_), error_of(smoothed()));
+    const std::string row =
+        std::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1f},{:.1f},{:.1f},{},{:.4f},{:.4f}", hour,
+                    sessions_, scans_, not_applied_, scan_times_.tell(), stats.keyframes, refused_, stats.loops_kept,
+                    stats.loops_on_trial, stats.loops_waiting, stats.loops_withdrawn, update_times_.tell(),
+                    batch_times_.tell(), stats.shadow_swaps, map_times_.tell(), map_.rebuilds(), live, graph_mb_,
+                    resident, map_.clouds().size(), error_of(odometry_), error_of(smoothed()));
     scans_ = 0;
     not_applied_ = 0;
     return row;
