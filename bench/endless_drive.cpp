@@ -176,6 +176,10 @@ class Drive {
 
   void publish(const SmootherUpdate& update) {
     if (update.loop && update.loop->accepted()) map_.add_loop(update.loop->from_id, update.loop->to_id);
+    for (const LoopResult& loop : update.changed) {
+      if (loop.accepted()) map_.add_loop(loop.from_id, loop.to_id);
+      if (loop.reason == LoopReason::kWithdrawn) map_.remove_loop(loop.from_id, loop.to_id);
+    }
     std::vector<CorrectedPose> poses;
     for (const KeyframePose& pose : update.moved) poses.push_back({pose.id, pose.T_map_body});
     map_.correct(update.T_map_odom, poses, update.revision);
