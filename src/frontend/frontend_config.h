@@ -229,10 +229,10 @@ struct FrontendConfig {
     visit.number("smooth_plane_m", self.smooth_plane_m, {0.0, 1.0}, "m",
                  "a plane of this roughness counts half as much as a perfect one; 0: all count alike");
     visit.number("enough_smooth_planes", self.enough_smooth_planes, {0.0, 1e4}, "planes",
-                 "where smooth planes amount to so many, a rough one counts half way between its smoothness and the "
-                 "fourth power of it; 0: by its smoothness");
+                 "where smooth planes hold each direction like so many, planes count half way between their smoothness "
+                 "and its fourth power, with range_noise_m left out; 0: by their smoothness");
     visit.number("range_noise_m", self.range_noise_m, {0.0, 1.0}, "m",
-                 "noise of a measured point, which is no roughness of the plane that it lies on");
+                 "noise of a measured point, which enough_smooth_planes does not take for roughness of a plane");
     visit.number("shock_accel_m_s2", self.shock_accel_m_s2, {0.0, 1000.0}, "m/s^2",
                  "a sample that differs from gravity by more is a shock, believed as little as a clipped one; 0: none");
     visit.number("shock_gyro_rad_s", self.shock_gyro_rad_s, {0.0, 100.0}, "rad/s",

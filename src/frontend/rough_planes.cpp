@@ -2,13 +2,16 @@
 #include "frontend/rough_planes.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <Eigen/Eigenvalues>
 
 namespace ignis {
 namespace {
 
-constexpr double kHardlyAny = 1e-3;  // planes: what a direction that nothing faces is taken to be held by
+// In a corridor smooth planes hold the way along it like 0.2 to 13, in rooms and halls like 10 to 50. With an exponent
+// of 2 and 10 planes for enough, what the corridor's end said was drowned in one of three drives.
+constexpr double kSteepness = 4.0;
 
 }  // namespace
 
@@ -22,23 +25,10 @@ double strict_smoothness(double smoothness) {
   return square * square;
 }
 
-void SmoothSupport::add(const Eigen::Vector3d& normal, double smoothness) {
-  planes_ += strict_smoothness(smoothness) * normal * normal.transpose();
-}
-
-void SmoothSupport::finish() {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(planes_);
-  directions_ = solver.eigenvectors();
-  held_ = solver.eigenvalues().cwiseMax(kHardlyAny);
-}
-
-double SmoothSupport::weight(const Eigen::Vector3d& normal, double smoothness) const {
-  // The information that the planes have of a shift along the normal while the other directions are free, 1 / (n^T A^-1
-  // n): what they hold of an oblique one is no more than what they hold of its weakest part.
-  const double loose = (directions_.transpose() * normal).cwiseAbs2().cwiseQuotient(held_).sum();
-  const double need = enough_ * loose / (enough_ * loose + 1.0);
-  const double strict = strict_smoothness(smoothness);
-  return strict + need * (smoothness - strict);
+double SmoothSupport::sufficiency(double enough) const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(planes_, Eigen::EigenvaluesOnly);
+  const double weakest = std::max(solver.eigenvalues()[0], 0.0);
+  return 1.0 / (1.0 + std::pow(enough / weakest, kSteepness));
 }
 
 }  // namespace ignis

@@ -116,8 +116,7 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
       const PlaneFit& plane = planes[i];
       if (plane.verdict != PlaneVerdict::kPlane) continue;
       const Eigen::Vector3d point_body = points[i].cast<double>();
-      const double variance = unexplained_variance(plane, config_.range_noise_m);
-      const double smoothness = plane_smoothness(variance, config_.smooth_plane_m);
+      const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
       const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);
       constraints_.push_back({point_body, plane, distance, smoothness, smoothness, 1.0});
     }
@@ -140,11 +139,15 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
 }
 
 void ScanMatcher::weigh_rough_planes() {
-  SmoothSupport support(config_.enough_smooth_planes);
-  for (const Constraint& constraint : constraints_) support.add(constraint.plane.normal, constraint.smoothness);
-  support.finish();
+  const auto strict = [this](const Constraint& constraint) {
+    const double variance = unexplained_variance(constraint.plane, config_.range_noise_m);
+    return strict_smoothness(plane_smoothness(variance, config_.smooth_plane_m));
+  };
+  SmoothSupport support;
+  for (const Constraint& constraint : constraints_) support.add(constraint.plane.normal, strict(constraint));
+  const double sufficiency = support.sufficiency(config_.enough_smooth_planes);
   for (Constraint& constraint : constraints_) {
-    constraint.hearing = support.weight(constraint.plane.normal, constraint.smoothness);
+    constraint.hearing += sufficiency * (strict(constraint) - constraint.hearing);
   }
 }
 
@@ -230,12 +233,13 @@ double ScanMatcher::inflation() const {
 
 double ScanMatcher::point_variance(const Pose& pose) const {
   if (!config_.adapt_measurement_noise) return config_.measurement_noise;
-  // Posterior mean of a variance whose prior is the configured value, worth `noise_prior_points` observations.
+  // Posterior mean of a variance whose prior is the configured value, worth `noise_prior_points` observations. What is
+  // heard for less than its smoothness is still off by what it is: the others are no surer for it.
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   double squares = 0.0;
   for (const Constraint& constraint : constraints_) {
     const double z = residual(R, pose.translation, constraint);
-    squares += constraint.smoothness * z * z;
+    squares += std::max(constraint.smoothness, constraint.hearing) * z * z;
   }
   const double sum = config_.noise_prior_points * config_.measurement_noise + inflation() * squares;
   const double variance = sum / (config_.noise_prior_points + static_cast<double>(constraints_.size()));

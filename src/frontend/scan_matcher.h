@@ -70,7 +70,7 @@ class ScanMatcher {
     PlaneFit plane;         ///< odom axes
     double plane_distance;  ///< [m] of the plane from the origin of odom, along its normal
     double smoothness;      ///< of the plane, (0, 1]: the share of a smooth one's information that it has by itself
-    double hearing;         ///< the same, less where smooth planes suffice
+    double hearing;         ///< the same, or its strict smoothness where smooth planes suffice, see SmoothSupport
     double weight;          ///< that times the observability weight
   };
   struct Assessment {
@@ -96,7 +96,8 @@ class ScanMatcher {
   /// a forklift that goes by can be most of what faces along the way, and it says what its own speed is. What stands is
   /// new only when it has just come into sight. A vehicle that does not know its own speed sees all that stands move.
   void leave_out_new_surfaces(int newest_scan);
-  /// Makes rough planes count less where smooth ones hold the same direction, see SmoothSupport.
+  /// Where smooth planes hold all directions, edges and corners fall silent, and what is rough by noise alone counts in
+  /// full; see SmoothSupport.
   void weigh_rough_planes();
   [[nodiscard]] Assessment assess(const FilterState& predicted);
   void find_observed_directions(const Assessment& assessment, const LocalMap& map);

@@ -13,7 +13,6 @@
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
 #include "frontend/deskew.h"
-#include "frontend/rough_planes.h"
 
 namespace ignis {
 namespace {
@@ -186,8 +185,7 @@ StartMotion::Look StartMotion::look(const Motion& motion, std::size_t stride) {
     Motion h;
     h << queries_[i].cross(plane.normal), plane.normal, half_sum * plane.normal;
     h *= seconds;
-    const double smoothness =
-        plane_smoothness(unexplained_variance(plane, config_.range_noise_m), config_.smooth_plane_m);
+    const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
     const double weight = static_cast<double>(stride) * smoothness / (kDistance * kDistance);
     information += weight * h * h.transpose();
     gradient += weight * h * plane.normal.dot(plane.offset);

@@ -62,46 +62,42 @@ TEST(UnexplainedVariance, IsTheWholeOneWhereNoiseIsUnknown) {
   EXPECT_DOUBLE_EQ(unexplained_variance(fit, 0.0), 1e-4);
 }
 
-SmoothSupport support_of(int along, int across, double smoothness = 1.0) {
-  SmoothSupport support(6.0);
-  for (int i = 0; i < along; ++i) support.add(kAlong, smoothness);
-  for (int i = 0; i < across; ++i) support.add(kAcross, smoothness);
-  for (int i = 0; i < 200; ++i) support.add(kUp, smoothness);
-  support.finish();
-  return support;
+constexpr double kEnough = 6.0;  // planes
+
+double sufficiency_of(int along, int across, double smoothness = 1.0) {
+  SmoothSupport support;
+  const double strict = strict_smoothness(smoothness);
+  for (int i = 0; i < along; ++i) support.add(kAlong, strict);
+  for (int i = 0; i < across; ++i) support.add(kAcross, strict);
+  for (int i = 0; i < 200; ++i) support.add(kUp, strict);
+  return support.sufficiency(kEnough);
 }
 
-TEST(SmoothSupport, LeavesRoughPlanesTheirWeightWhereNothingElseFacesTheWay) {
-  EXPECT_NEAR(support_of(0, 200).weight(kAlong, 0.3), 0.3, 0.001);
+TEST(StrictSmoothness, IsNextToNothingOfARoughPlanesAndAllOfASmoothOnes) {
+  EXPECT_LT(strict_smoothness(0.3), 0.01);
+  EXPECT_DOUBLE_EQ(strict_smoothness(1.0), 1.0);
 }
 
-TEST(SmoothSupport, LeavesRoughPlanesHalfOfWhatIsToBeLostWhereSmoothOnesJustSuffice) {
-  EXPECT_NEAR(support_of(6, 200).weight(kAlong, 0.3), 0.5 * (0.3 + strict_smoothness(0.3)), 0.001);
+TEST(SmoothSupport, IsNoneWhereNothingFacesTheWay) {
+  EXPECT_LT(sufficiency_of(0, 200), 1e-9);
+  EXPECT_LT(sufficiency_of(1, 200), 0.001);
 }
 
-TEST(SmoothSupport, LeavesRoughPlanesNextToNothingWhereSmoothOnesHoldTheWay) {
-  const SmoothSupport support = support_of(200, 200);
-  EXPECT_LT(support.weight(kAlong, 0.3), 0.02);
-  EXPECT_DOUBLE_EQ(support.weight(kAlong, 1.0), 1.0);
-}
+TEST(SmoothSupport, IsHalfWhereTheWeakestDirectionIsHeldByEnough) { EXPECT_NEAR(sufficiency_of(6, 200), 0.5, 1e-9); }
 
-TEST(SmoothSupport, AsksForTheWeakestPartOfAnObliqueNormal) {
-  const Eigen::Vector3d oblique = (kAlong + kAcross).normalized();
-  EXPECT_GT(support_of(0, 200).weight(oblique, 0.3), 0.29);
-  EXPECT_LT(support_of(200, 200).weight(oblique, 0.3), 0.02);
-}
+TEST(SmoothSupport, IsWholeWhereAllDirectionsAreHeld) { EXPECT_GT(sufficiency_of(200, 200), 0.999); }
 
-TEST(SmoothSupport, HoldsHoweverManyPlanesFaceOneWay) {
-  SmoothSupport support(6.0);
-  const Eigen::Vector3d oblique = Eigen::Vector3d(0.3, -0.7, 0.2).normalized();
-  for (int i = 0; i < 200'000; ++i) support.add(oblique, 1.0);
-  support.finish();
-  EXPECT_NEAR(support.weight(oblique, 0.3), strict_smoothness(0.3), 1e-3);
-  EXPECT_NEAR(support.weight(oblique.unitOrthogonal(), 0.3), 0.3, 1e-3);
-}
+TEST(SmoothSupport, IsNotOfRoughPlanes) { EXPECT_LT(sufficiency_of(200, 200, 0.2), 0.01); }
 
-TEST(SmoothSupport, DoesNotTakeRoughPlanesForSmoothOnes) {
-  EXPECT_GT(support_of(200, 200, 0.2).weight(kAlong, 0.3), 0.25);
+TEST(SmoothSupport, AsksForTheWeakestDirectionHoweverItLies) {
+  const Eigen::Matrix3d turned =
+      Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, -0.5).normalized()).toRotationMatrix();
+  SmoothSupport support;
+  for (int i = 0; i < 200'000; ++i) support.add(turned * kUp, 1.0);
+  for (int i = 0; i < 200'000; ++i) support.add(turned * kAcross, 1.0);
+  EXPECT_LT(support.sufficiency(kEnough), 1e-6);
+  for (int i = 0; i < 6; ++i) support.add(turned * kAlong, 1.0);
+  EXPECT_NEAR(support.sufficiency(kEnough), 0.5, 1e-3);
 }
 
 }  // namespace

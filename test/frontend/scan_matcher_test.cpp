@@ -112,6 +112,8 @@ struct Patches {
   float too_high = 0.03F;  ///< [m]
   float noise = 0.0F;      ///< [m] of the points that are matched with it, up and down in turn
   bool all_rough = false;
+  bool walls = false;  ///< smooth ones around it; else nothing holds a shift along the floor
+  double range_noise_m = 0.0;
 };
 
 /// Calls visit(x, z, i, k) for a grid of 5 cm over 4 m x 4 m.
@@ -123,11 +125,8 @@ void for_each_point_of_a_floor(auto&& visit) {
 }
 
 /// What a standing sensor makes of points that it sees of what it has mapped in forty scans.
-MatchResult match_at_rest(double smooth_plane_m, double enough_smooth_planes, std::span<const Eigen::Vector3f> mapped,
+MatchResult match_at_rest(const FrontendConfig& config, std::span<const Eigen::Vector3f> mapped,
                           std::span<const Eigen::Vector3f> seen, double prior_variance) {
-  FrontendConfig config = test::tuned_config();
-  config.smooth_plane_m = smooth_plane_m;
-  config.enough_smooth_planes = enough_smooth_planes;
   LocalMap map(config);
   for (int scan = 0; scan < 40; ++scan) map.insert(mapped, Pose(), true);
   FilterState predicted;
@@ -138,6 +137,19 @@ MatchResult match_at_rest(double smooth_plane_m, double enough_smooth_planes, st
 }
 
 double height(const MatchResult& result) { return result.filter.nominal.T_odom_body.translation.y(); }
+
+/// Four walls around the floor, two metres high.
+void add_walls(std::vector<Eigen::Vector3f>& mapped, std::vector<Eigen::Vector3f>& seen) {
+  for_each_point_of_a_floor([&](float along, float up, int, int) {
+    if (up < -1.0F || up > 1.0F) return;
+    for (const float away : {-2.05F, 2.05F}) {
+      for (const Eigen::Vector3f& point : {Eigen::Vector3f(away, up, along), Eigen::Vector3f(along, up, away)}) {
+        mapped.push_back(point);
+        seen.push_back(point);
+      }
+    }
+  });
+}
 
 /// What a standing sensor a metre above the patches makes of them.
 MatchResult match_over(const Patches& patches) {
@@ -150,7 +162,12 @@ MatchResult match_over(const Patches& patches) {
     mapped.emplace_back(x, rough ? patches.too_high + (high ? -0.98F : -1.02F) : -1.0F, z);
     seen.emplace_back(x, -1.0F + ((i + k) % 2 != 0 ? patches.noise : -patches.noise), z);
   });
-  return match_at_rest(patches.smooth_plane_m, patches.enough_smooth_planes, mapped, seen, 1e-4);
+  if (patches.walls) add_walls(mapped, seen);
+  FrontendConfig config = test::tuned_config();
+  config.smooth_plane_m = patches.smooth_plane_m;
+  config.enough_smooth_planes = patches.enough_smooth_planes;
+  config.range_noise_m = patches.range_noise_m;
+  return match_at_rest(config, mapped, seen, 1e-4);
 }
 
 TEST(RoughPlanes, CountForLittleWhereThereAreSmoothOnes) {
@@ -160,22 +177,49 @@ TEST(RoughPlanes, CountForLittleWhereThereAreSmoothOnes) {
 }
 
 TEST(RoughPlanes, CountForNextToNothingWhereSmoothOnesSuffice) {
-  const double by_smoothness = height(match_over({.smooth_plane_m = 0.013}));
+  const double by_smoothness = height(match_over({.smooth_plane_m = 0.013, .walls = true}));
   EXPECT_GT(by_smoothness, 0.003);
-  EXPECT_LT(std::abs(height(match_over({.smooth_plane_m = 0.013, .enough_smooth_planes = 6.0}))), 0.3 * by_smoothness);
+  const Patches strict{.smooth_plane_m = 0.013, .enough_smooth_planes = 6.0, .walls = true};
+  EXPECT_LT(std::abs(height(match_over(strict))), 0.3 * by_smoothness);
 }
 
-TEST(RoughPlanes, AreHeardWhereTheyAreAllThatFacesTheWay) {
-  const double by_smoothness = height(match_over({.smooth_plane_m = 0.005, .all_rough = true}));
-  EXPECT_GT(by_smoothness, 0.01);
-  const double needed = height(match_over({.smooth_plane_m = 0.005, .enough_smooth_planes = 6.0, .all_rough = true}));
+TEST(RoughPlanes, AreHeardWhereSmoothOnesLeaveADirectionOpen) {
+  const double by_smoothness = height(match_over({.smooth_plane_m = 0.013}));
+  const double needed = height(match_over({.smooth_plane_m = 0.013, .enough_smooth_planes = 6.0}));
   EXPECT_GT(needed, 0.9 * by_smoothness);
 }
 
+TEST(RoughPlanes, AreHeardWhereTheyAreAllThatFacesTheWay) {
+  const Patches floor{.smooth_plane_m = 0.005, .all_rough = true, .walls = true};
+  const double by_smoothness = height(match_over(floor));
+  EXPECT_GT(by_smoothness, 0.01);
+  Patches strict = floor;
+  strict.enough_smooth_planes = 6.0;
+  EXPECT_GT(height(match_over(strict)), 0.9 * by_smoothness);
+}
+
+TEST(RoughPlanes, AreNotRoughWhereNoiseOfThePointsExplainsIt) {
+  const Patches floor{.smooth_plane_m = 0.013, .enough_smooth_planes = 6.0, .walls = true};
+  Patches noisy = floor;
+  noisy.range_noise_m = 0.3;  // a voxel is the mean of many
+  EXPECT_GT(height(match_over(noisy)), 5.0 * std::abs(height(match_over(floor))));
+}
+
+double information_on_height(const MatchResult& result) { return result.information_body(4, 4); }
+
+TEST(RoughPlanes, ThatNoiseExplainsAreOffByAllThatTheyAreOffBy) {
+  const Patches alike{.smooth_plane_m = 0.0, .too_high = 0.0F, .noise = 0.05F, .all_rough = true, .walls = true};
+  Patches explained = alike;
+  explained.smooth_plane_m = 0.013;
+  explained.enough_smooth_planes = 6.0;
+  explained.range_noise_m = 1.0;
+  // Were they counted as off by a rough one's share of what they are off by, it would be four times as much.
+  EXPECT_LT(information_on_height(match_over(explained)), 2.0 * information_on_height(match_over(alike)));
+}
+
 TEST(RoughPlanes, DoNotMakeTheSmoothOnesPassForNoisy) {
-  const auto information = [](const MatchResult& result) { return result.information_body(4, 4); };  // on the height
-  const double where_they_fit = information(match_over({.too_high = 0.0F, .noise = 0.02F}));
-  const double where_they_do_not = information(match_over({.too_high = 0.03F, .noise = 0.02F}));
+  const double where_they_fit = information_on_height(match_over({.too_high = 0.0F, .noise = 0.02F}));
+  const double where_they_do_not = information_on_height(match_over({.too_high = 0.03F, .noise = 0.02F}));
   EXPECT_GT(where_they_do_not, 0.7 * where_they_fit);
 }
 
@@ -189,7 +233,10 @@ double height_over_strips(double smooth_plane_m) {
     mapped.emplace_back(x, low ? -1.0F : -0.96F, z);
     if (low) seen.push_back(mapped.back());
   });
-  return height(match_at_rest(smooth_plane_m, 0.0, mapped, seen, 1e-2));
+  FrontendConfig config = test::tuned_config();
+  config.smooth_plane_m = smooth_plane_m;
+  config.enough_smooth_planes = 0.0;
+  return height(match_at_rest(config, mapped, seen, 1e-2));
 }
 
 TEST(RoughPlanes, LieWhereTheVoxelOfThePointSaysAndNotWhereItsNeighboursDo) {
