@@ -189,6 +189,15 @@ TEST(MovingStart, TheFirstStateIsLevelByTheAccelerationThatScansFound) {
   EXPECT_NEAR(std::sqrt(first.covariance(kGravityTilt, kGravityTilt)), tilt, 0.1 * tilt);
 }
 
+TEST(MovingStart, TheFirstStateIsLevelByWhatTheAccelerometerReadAndNotLessAnEarlierBias) {
+  const FrontendConfig config = moving_config();
+  NavState standing;  // level with that bias, which is not told apart from a tilt here
+  standing.accel_bias = Eigen::Vector3d(0.0, 0.0, 0.3);
+  const FilterState first = moving_state(config, standing, BentMotion{});
+  const Eigen::Vector3d read = config.gravity_m * frames::up() + standing.accel_bias;
+  EXPECT_LT((first.nominal.T_odom_body.rotation * read.normalized() - frames::up()).norm(), 1e-9);
+}
+
 TEST(MovingStart, AStateFromAForceThatIsKnownIsAsLevelAsTheForceIsSure) {
   const FrontendConfig config = moving_config();
   const Eigen::Vector3d up_force = 9.81 * Eigen::Vector3d(0.05, 1.0, -0.08).normalized();

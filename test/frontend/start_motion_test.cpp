@@ -61,6 +61,19 @@ TEST(StartMotion, SeesThatAVehicleStands) {
   }
 }
 
+TEST(StartMotion, SeesThatAVehicleStandsThoughPointsHaveNoTimes) {
+  StartMotion start_motion(test::tuned_config());
+  for (Scan scan : test::simulate(test::furnished_hall(), standing(), 1.5, Sensors{}, 1).scans) {
+    scan.utime = scan.end_utime();
+    scan.duration_us = 0;
+    for (ScanPoint& point : scan.points) point.dt_us = 0;
+    start_motion.add(scan);
+  }
+  const std::optional<SteadyMotion> motion = start_motion.find();
+  ASSERT_TRUE(motion);
+  EXPECT_FALSE(motion->is_rolling()) << describe(*motion);
+}
+
 TEST(StartMotion, SaysNothingWhereAllPlacesAlongTheWayLookAlike) {
   EXPECT_FALSE(motion_in(test::bare_corridor(), standing(), 5));
   EXPECT_FALSE(motion_in(test::bare_corridor(), test::straight_drive(0.0, 1.5), 5));
