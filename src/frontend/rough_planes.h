@@ -22,16 +22,15 @@ namespace ignis {
 
 /// How well the smooth planes of a scan hold shifts. Turns are not looked at.
 ///
-/// It is asked of the weakest direction and not of the one that a plane faces. Weighed by the latter, a corridor's
-/// rough planes across the way fell silent while its frames along it were still heard, and of sixty drives one lost its
-/// way.
+/// It is asked of the weakest direction and not of the one that a plane faces: where little tells the way, as in a
+/// door, all that there is stays as it is (docs/front_end.md, "Edges that pass for planes").
 class SmoothSupport {
  public:
   /// A plane with its unit normal. It amounts to `strict`, its strict smoothness.
   void add(const Eigen::Vector3d& normal, double strict) { planes_ += strict * normal * normal.transpose(); }
 
-  /// From 0, where they hold some direction hardly at all, over 1/2, where they hold each like `enough` [planes] that
-  /// face it, to 1.
+  /// From 0, where they hold some direction hardly at all, over 1/2, where they hold each like `enough` [planes, more
+  /// than 0] that face it, to 1.
   [[nodiscard]] double sufficiency(double enough) const;
 
  private:

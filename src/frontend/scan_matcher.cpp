@@ -234,7 +234,8 @@ double ScanMatcher::inflation() const {
 double ScanMatcher::point_variance(const Pose& pose) const {
   if (!config_.adapt_measurement_noise) return config_.measurement_noise;
   // Posterior mean of a variance whose prior is the configured value, worth `noise_prior_points` observations. What is
-  // heard for less than its smoothness is still off by what it is: the others are no surer for it.
+  // heard for less than its smoothness is still off by what it is, and what is heard for more by as much more: the pose
+  // is no surer for either.
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   double squares = 0.0;
   for (const Constraint& constraint : constraints_) {

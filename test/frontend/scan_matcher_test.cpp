@@ -207,7 +207,7 @@ TEST(RoughPlanes, AreNotRoughWhereNoiseOfThePointsExplainsIt) {
 
 double information_on_height(const MatchResult& result) { return result.information_body(4, 4); }
 
-TEST(RoughPlanes, ThatNoiseExplainsAreOffByAllThatTheyAreOffBy) {
+TEST(RoughPlanes, ThatNoiseExplainsDoNotPassForCertain) {
   const Patches alike{.smooth_plane_m = 0.0, .too_high = 0.0F, .noise = 0.05F, .all_rough = true, .walls = true};
   Patches explained = alike;
   explained.smooth_plane_m = 0.013;
