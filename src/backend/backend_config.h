@@ -37,6 +37,8 @@ struct BackendConfig {
 
   double stationary_velocity = 0.02;
 
+  int estimated_keyframes = 4000;
+
   // Loops.
   double cloud_voxel_m = 0.15;
   double cloud_memory_mb = 256.0;
@@ -85,6 +87,8 @@ struct BackendConfig {
     visit.number("loose_velocity", self.loose_velocity, {1e-3, 100.0}, "m/s", "the same, velocity");
     visit.number("stationary_velocity", self.stationary_velocity, {1e-4, 1.0}, "m/s",
                  "sigma of the zero velocity of a keyframe that stood still");
+    visit.integer("estimated_keyframes", self.estimated_keyframes, {20, 1000000}, "keyframes",
+                  "newest keyframes whose poses the graph estimates; older ones stay where they are, as known places");
     visit.number("cloud_voxel_m", self.cloud_voxel_m, {0.01, 2.0}, "m",
                  "of a keyframe's cloud one point per voxel is kept, in memory and in the journal");
     visit.number("cloud_memory_mb", self.cloud_memory_mb, {0.1, 1e6}, "MB",

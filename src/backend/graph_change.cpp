@@ -44,7 +44,20 @@ void transfer(auto& io, FieldsOf<GraphNode> auto& node) {
   transfer(io, node.end);
   io.matrix(node.odometry);
   io.matrix(node.pose_covariance);
-  transfer(io, node.link);
+}
+
+void transfer(auto& io, FieldsOf<PoseGraphEdge> auto& edge) {
+  io.number(edge.from);
+  io.number(edge.to);
+  transfer(io, edge.T_from_to);
+  io.matrix(edge.information);
+  io.number(edge.is_loop);
+}
+
+void transfer(auto& io, FieldsOf<RetiredKeyframes> auto& retired) {
+  io.number(retired.count);
+  io.matrix(retired.covariance);
+  io.list(retired.loops);
 }
 
 void transfer(auto& io, FieldsOf<LoopVeto> auto& veto) {
@@ -67,6 +80,7 @@ void transfer(auto& io, FieldsOf<SmootherStats> auto& stats) {
 /// Without loops and clouds. Poses follow from the solver, and what was published is published anew.
 void transfer(auto& io, FieldsOf<SmootherState> auto& state) {
   io.list(state.nodes);
+  io.list(state.links);
   io.list(state.vetoes);
   transfer(io, state.stats);
   io.matrix(state.angular_rate);
@@ -87,6 +101,7 @@ void transfer(auto& io, FieldsOf<LinearisationPoint> auto& point) {
 
 void transfer(auto& io, FieldsOf<GraphChange> auto& change) {
   transfer(io, change.state);
+  io.maybe(change.retired);
   io.list(change.clouds);
   transfer(io, change.loops);
   transfer(io, change.waiting);
@@ -116,10 +131,19 @@ std::string chain_problem(const SmootherState& state, const GraphChange& change)
   if (news.nodes.size() != change.clouds.size()) return "as many clouds as keyframes are missing";
   if (!state.nodes.empty() && news.session != state.session) return "the session changes";
   std::int32_t previous = state.nodes.empty() ? -1 : state.nodes.back().end.id;
-  for (const GraphNode& node : news.nodes) {
-    const bool is_linked = node.link.previous_id == previous && node.link.id == node.end.id;
-    if (!is_linked || node.end.id <= previous) return std::format("keyframe {} is not linked", node.end.id);
-    previous = node.end.id;
+  const std::size_t nodes = state.nodes.size() + news.nodes.size();
+  const std::size_t retired = change.retired ? change.retired->count : state.retired.count;
+  if (change.retired && (retired <= state.retired.count || retired >= nodes))
+    return std::format("{} of {} keyframes have retired, after {}", retired, nodes, state.retired.count);
+  // Those that came and retired within one change have no links any more.
+  if (news.links.size() != std::min(news.nodes.size(), nodes - retired)) return "links of keyframes are missing";
+  const std::size_t first_linked = news.nodes.size() - news.links.size();
+  for (std::size_t i = 0; i < news.nodes.size(); ++i) {
+    const std::int32_t id = news.nodes[i].end.id;
+    const KeyframeLink* link = i < first_linked ? nullptr : &news.links[i - first_linked];
+    const bool is_linked = link == nullptr || (link->previous_id == previous && link->id == id);
+    if (!is_linked || id <= previous) return std::format("keyframe {} is not linked", id);
+    previous = id;
   }
   return {};
 }
@@ -140,6 +164,11 @@ std::string reference_problem(const SmootherState& state, std::size_t known, con
                              index_of(state.nodes, loop.result.to_id) < state.nodes.size();
       if (!are_known) return std::format("loop {}-{} names unknown keyframes", loop.result.from_id, loop.result.to_id);
     }
+  }
+  for (const PoseGraphEdge& edge : change.retired.value_or(RetiredKeyframes()).loops) {
+    const bool are_known =
+        index_of(state.nodes, edge.from) < state.nodes.size() && index_of(state.nodes, edge.to) < state.nodes.size();
+    if (!are_known) return std::format("loop {}-{} names unknown keyframes", edge.to, edge.from);
   }
   return {};
 }
@@ -168,14 +197,24 @@ std::string RestoredGraph::apply(GraphChange change) {
   apply_to(state.loops, std::move(change.loops));
   apply_to(state.waiting, std::move(change.waiting));
   std::ranges::move(change.state.vetoes, std::back_inserter(state.vetoes));
+  if (change.retired) {
+    std::ranges::move(change.retired->loops, std::back_inserter(state.retired.loops));
+    state.retired.count = change.retired->count;
+    state.retired.covariance = change.retired->covariance;
+  }
   copy_scalars(change.state, state);
+  std::ranges::move(change.state.links, std::back_inserter(state.links));
+  while (state.links.size() > state.nodes.size() - state.retired.count) state.links.pop_front();
   return {};
 }
 
 ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph()) {}
 
 ChangeTracker::ChangeTracker(const RestoredGraph& known)
-    : nodes_(known.state.nodes.size()), vetoes_(known.state.vetoes.size()) {
+    : nodes_(known.state.nodes.size()),
+      retired_(known.state.retired.count),
+      retired_loops_(known.state.retired.loops.size()),
+      vetoes_(known.state.vetoes.size()) {
   static_cast<void>(loops_.next(known.state.loops));
   static_cast<void>(waiting_.next(known.state.waiting));
 }
@@ -187,7 +226,17 @@ GraphChange ChangeTracker::next(const SmootherState& state, std::vector<Linearis
     const CompactCloud* cloud = state.clouds.in_memory(i);
     change.clouds.push_back(cloud != nullptr ? *cloud : CompactCloud());
   }
+  const auto linked = std::min(std::ssize(state.links), std::ssize(state.nodes) - static_cast<std::ptrdiff_t>(nodes_));
+  change.state.links.assign(state.links.end() - linked, state.links.end());
   nodes_ = state.nodes.size();
+  if (state.retired.count != retired_) {
+    change.retired = {
+        state.retired.count,
+        state.retired.covariance,
+        {state.retired.loops.begin() + static_cast<std::ptrdiff_t>(retired_loops_), state.retired.loops.end()}};
+  }
+  retired_ = state.retired.count;
+  retired_loops_ = state.retired.loops.size();
   change.state.vetoes.assign(state.vetoes.begin() + static_cast<std::ptrdiff_t>(vetoes_), state.vetoes.end());
   vetoes_ = state.vetoes.size();
   copy_scalars(state, change.state);

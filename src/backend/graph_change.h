@@ -22,7 +22,10 @@ struct LinearisationPoint {
 };
 
 struct GraphChange {
-  SmootherState state;                         ///< scalars as they are now; nodes and vetoes: the new ones; no loops
+  /// Scalars as they are now; nodes and vetoes: the new ones; links: those of new nodes that have not retired; no
+  /// loops.
+  SmootherState state;
+  std::optional<RetiredKeyframes> retired;     ///< if more have; their loops: the new ones
   std::vector<CompactCloud> clouds;            ///< one per new node
   LoopListChange loops;                        ///< those in the graph
   LoopListChange waiting;                      ///< those outside of it
@@ -34,7 +37,8 @@ struct GraphChange {
 /// Nothing when the bytes are no change. Never reads beyond them.
 [[nodiscard]] std::optional<GraphChange> decode_change(std::span<const std::byte> bytes);
 
-/// State and linearisation points by node, as the changes so far leave them.
+/// State and linearisation points by node (of those that have retired: where they stay), as the changes so far leave
+/// them.
 struct RestoredGraph {
   SmootherState state;
   std::vector<LinearisationPoint> linearised;
@@ -57,6 +61,8 @@ class ChangeTracker {
 
  private:
   std::size_t nodes_ = 0;
+  std::size_t retired_ = 0;
+  std::size_t retired_loops_ = 0;
   LoopListMemory loops_;
   LoopListMemory waiting_;
   std::size_t vetoes_ = 0;

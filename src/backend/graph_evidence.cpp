@@ -3,7 +3,6 @@
 
 #include <gtsam/geometry/Pose3.h>
 #include <gtsam/inference/Symbol.h>
-#include <gtsam/nonlinear/Values.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -39,7 +38,6 @@ IncrementalSolver::KeyPair ends_of(const GraphLoop& loop) { return {X(loop.resul
 std::optional<LoopEvidence> evidence_of(std::span<const GraphLoop* const> loops, const IncrementalSolver& solver,
                                         const SmootherState& state) {
   if (!solver.failure().empty()) return std::nullopt;
-  const gtsam::Values& points = solver.linearisation_points();
   std::vector<IncrementalSolver::KeyPair> ends;
   std::vector<LoopEvidence::Part> parts;
   Eigen::VectorXd errors(6 * std::ssize(loops));
@@ -48,7 +46,7 @@ std::optional<LoopEvidence> evidence_of(std::span<const GraphLoop* const> loops,
     const auto& [to, from] = ends.emplace_back(ends_of(*loop));
     // With the very slope and error that the solver has: a loop that the graph leans on takes with it nearly all that
     // is there, and what remains is their difference.
-    const gtsam::Pose3 T_to_from = points.at<gtsam::Pose3>(to).between(points.at<gtsam::Pose3>(from));
+    const gtsam::Pose3 T_to_from = solver.linearisation_point(to).between(solver.linearisation_point(from));
     gtsam::Matrix6 slope;
     const gtsam::Vector6 error = gtsam::Pose3::Logmap(to_gtsam(loop->result.T_to_from).between(T_to_from), slope);
     errors.segment<6>(row) = slope.partialPivLu().solve(error) + solver.relative_offset({to, from});

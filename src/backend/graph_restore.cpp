@@ -20,9 +20,10 @@ std::vector<LinearisationPoint> take_linearised(IncrementalSolver& solver) {
   for (const gtsam::Key key : solver.take_relinearised()) {
     ids.insert(static_cast<std::int32_t>(gtsam::Symbol(key).index()));
   }
-  const gtsam::Values& values = solver.linearisation_points();
+  const gtsam::Values& estimated = solver.linearisation_points();
+  const gtsam::Values& fixed = solver.fixed();
   std::vector<LinearisationPoint> points;
-  for (const std::int32_t id : ids) points.push_back({id, estimate_of(values, id)});
+  for (const std::int32_t id : ids) points.push_back({id, estimate_of(fixed.exists(X(id)) ? fixed : estimated, id)});
   return points;
 }
 
@@ -31,17 +32,24 @@ std::string restore_solver(RestoredGraph& graph, const BackendConfig& config, In
   if (state.nodes.empty()) return {};
   gtsam::NonlinearFactorGraph factors;
   gtsam::Values values;
-  for (const GraphNode& node : state.nodes) add_link_factors(node.link, config, factors);
+  gtsam::Values fixed;
+  for (const KeyframeLink& link : state.links) add_link_factors(link, config, factors);
   for (const GraphLoop& loop : state.loops) {
     factors.push_back(
         make_relative_pose_factor(X(loop.result.to_id), X(loop.result.from_id), loop.result.T_to_from, loop.rows));
   }
-  for (const LinearisationPoint& point : graph.linearised) insert_estimate(point.id, point.state, values);
+  for (std::size_t i = 0; i < graph.linearised.size(); ++i) {
+    const LinearisationPoint& point = graph.linearised[i];
+    insert_estimate(point.id, point.state, i < state.retired.count ? fixed : values);
+  }
+  solver.add_fixed(fixed);
   const SolverOutcome outcome = solver.add(factors, values);
   if (!outcome.accepted) return outcome.reason;
   static_cast<void>(solver.take_relinearised());  // the journal has them
   const std::size_t first_loop = outcome.factors.size() - state.loops.size();
   for (std::size_t i = 0; i < state.loops.size(); ++i) state.loops[i].factor = outcome.factors[first_loop + i];
+  for (std::size_t i = 0; i < state.retired.count; ++i)
+    state.poses.push_back({state.nodes[i].end.id, graph.linearised[i].state.T_odom_body});
   refresh_poses(solver, state);
   return {};
 }

@@ -14,6 +14,7 @@
 #include <limits>
 #include <utility>
 
+#include "backend/conditioned_factor.h"
 #include "backend/isam2.h"
 #include "common/config_check.h"
 
@@ -42,30 +43,44 @@ std::string name_of(gtsam::Key key) { return std::string(gtsam::Symbol(key)); }
 }  // namespace
 
 struct IncrementalSolver::Impl {
-  explicit Impl(const SolverConfig& config) : params(settings(config)), isam(params) {}
+  explicit Impl(Isam2Settings how) : params(std::move(how)), isam(params) {}
 
   /// Why the batch must not reach GTSAM, or an empty text.
   [[nodiscard]] std::string problem(const gtsam::NonlinearFactorGraph& batch, const gtsam::Values& news) {
     if (!broken.empty()) return broken;
     for (const gtsam::Key key : news.keys()) {
-      if (isam.exists(key)) return std::format("variable {} exists already", name_of(key));
+      if (exists(key)) return std::format("variable {} exists already", name_of(key));
     }
     for (const auto& factor : batch) {
-      gtsam::Values around;
+      bool is_open = false;
       for (const gtsam::Key key : factor->keys()) {
-        if (news.exists(key)) {
-          around.insert(key, news.at(key));
-        } else if (isam.exists(key)) {
-          around.insert(key, estimate_of(std::span(&key, 1)).at(key));
-        } else {
+        if (!news.exists(key) && !exists(key))
           return std::format("a factor names the unknown variable {}", name_of(key));
-        }
+        is_open = is_open || !fixed.exists(key);
       }
-      if (!std::isfinite(factor->error(around))) {
+      if (!is_open) return std::format("a factor on {} names only what is fixed", name_of(factor->keys().front()));
+      if (!std::isfinite(factor->error(around(*factor, news)))) {
         return std::format("a factor on {} has an error that is not finite", name_of(factor->keys().front()));
       }
     }
     return {};
+  }
+
+  [[nodiscard]] bool exists(gtsam::Key key) const { return isam.exists(key) || fixed.exists(key); }
+
+  /// Where the factor's variables are, those of `news` there.
+  [[nodiscard]] gtsam::Values around(const gtsam::NonlinearFactor& factor, const gtsam::Values& news) {
+    gtsam::Values places;
+    for (const gtsam::Key key : factor.keys()) {
+      if (news.exists(key)) {
+        places.insert(key, news.at(key));
+      } else if (fixed.exists(key)) {
+        places.insert(key, fixed.at(key));
+      } else {
+        places.insert(key, estimate_of(std::span(&key, 1)).at(key));
+      }
+    }
+    return places;
   }
 
   /// One update of iSAM2; the reason if it failed.
@@ -142,12 +157,19 @@ struct IncrementalSolver::Impl {
     for (const std::size_t index : isam.factors_of(key)) errors[id_of[index]] = kUnknown;
   }
 
-  /// What the offsets of two poses make of the offset of the second against the first, in body axes of the second.
+  [[nodiscard]] gtsam::Pose3 linearisation_point(gtsam::Key key) const {
+    if (fixed.exists(key)) return fixed.at<gtsam::Pose3>(key);
+    return (broken.empty() ? isam.linearisation_points() : values).at<gtsam::Pose3>(key);
+  }
+
+  /// What the offsets of two poses make of the offset of the second against the first, in body axes of the second. What
+  /// is fixed has none.
   [[nodiscard]] Isam2::Sum relative_terms(const KeyPair& pair) const {
-    const gtsam::Values& points = isam.linearisation_points();
     const auto& [from, to] = pair;
-    const gtsam::Matrix6 A = -points.at<gtsam::Pose3>(to).between(points.at<gtsam::Pose3>(from)).AdjointMap();
-    return {{from, A}, {to, gtsam::I_6x6}};
+    const gtsam::Matrix6 A = -linearisation_point(to).between(linearisation_point(from)).AdjointMap();
+    Isam2::Sum terms{{from, A}, {to, gtsam::I_6x6}};
+    std::erase_if(terms, [&](const Isam2::Term& term) { return fixed.exists(term.key); });
+    return terms;
   }
 
   double error_of(FactorId id) {
@@ -163,6 +185,7 @@ struct IncrementalSolver::Impl {
   std::vector<double> errors;                               ///< by FactorId: half chi-square at `values`, or kUnknown
   std::vector<FactorId> id_of;                              ///< by index in iSAM2
   gtsam::Values values;  ///< of each variable, the last solution that was asked for, or its first value
+  gtsam::Values fixed;   ///< variables that are estimated no more
   boost::unordered_flat_set<gtsam::Key> stale;         ///< variables that iSAM2 has moved since
   std::vector<gtsam::Key> changed;                     ///< variables that it has moved since take_changed()
   boost::unordered_flat_set<gtsam::Key> relinearised;  ///< that it has linearised anew since take_relinearised()
@@ -173,7 +196,7 @@ struct IncrementalSolver::Impl {
 
 IncrementalSolver::IncrementalSolver(const SolverConfig& config) {
   config::require_valid(config, "backend.solver");
-  impl_ = std::make_unique<Impl>(config);
+  impl_ = std::make_unique<Impl>(settings(config));
 }
 
 IncrementalSolver::~IncrementalSolver() = default;
@@ -184,16 +207,18 @@ SolverOutcome IncrementalSolver::add(const gtsam::NonlinearFactorGraph& factors,
   SolverOutcome outcome;
   outcome.reason = impl_->problem(factors, values);
   if (!outcome.reason.empty()) return outcome;
+  gtsam::NonlinearFactorGraph open;
+  for (const auto& factor : factors) open.push_back(conditioned(factor, impl_->fixed));
   std::vector<std::size_t> indices;
-  outcome.reason = impl_->update(factors, values, {}, indices);
+  outcome.reason = impl_->update(open, values, {}, indices);
   if (!outcome.reason.empty()) {
     impl_->recover();
     return outcome;
   }
-  for (std::size_t i = 0; i < factors.size(); ++i) {
+  for (std::size_t i = 0; i < open.size(); ++i) {
     const FactorId id = impl_->factors.size();
     outcome.factors.push_back(id);
-    impl_->factors.push_back(factors[i]);
+    impl_->factors.push_back(open[i]);
     impl_->isam_index.push_back(0);
     impl_->errors.push_back(kUnknown);
     impl_->place(id, indices[i]);
@@ -222,6 +247,33 @@ SolverOutcome IncrementalSolver::remove(std::span<const FactorId> factors) {
   outcome.accepted = true;
   return outcome;
 }
+
+bool IncrementalSolver::fix(std::span<const std::uint64_t> keys) {
+  if (!impl_->broken.empty()) return false;
+  impl_->estimate();
+  auto next = std::make_unique<Impl>(impl_->params);
+  next->values = impl_->values;
+  next->fixed = impl_->fixed;
+  for (const gtsam::Key key : keys) {
+    next->fixed.insert(key, next->values.at(key));
+    next->values.erase(key);
+  }
+  for (const auto& factor : impl_->factors) next->factors.push_back(factor ? conditioned(factor, next->fixed) : factor);
+  next->isam_index.resize(next->factors.size());
+  next->errors.resize(next->factors.size(), kUnknown);
+  next->changed = impl_->changed;
+  next->relinearised = impl_->relinearised;
+  next->relinearised.insert(keys.begin(), keys.end());
+  next->rebuilds = impl_->rebuilds;
+  next->rebuild();
+  if (!next->broken.empty()) return false;
+  impl_ = std::move(next);
+  return true;
+}
+
+void IncrementalSolver::add_fixed(const gtsam::Values& values) { impl_->fixed.insert(values); }
+
+const gtsam::Values& IncrementalSolver::fixed() const { return impl_->fixed; }
 
 bool IncrementalSolver::settle(int updates) {
   // iSAM2 looks at the thresholds in one of relinearize_skip updates. If it finds nothing there, it never will.
@@ -265,8 +317,11 @@ const gtsam::Values& IncrementalSolver::linearisation_points() const {
 }
 
 gtsam::Pose3 IncrementalSolver::pose(std::uint64_t key) {
+  if (impl_->fixed.exists(key)) return impl_->fixed.at<gtsam::Pose3>(key);
   return impl_->estimate_of(std::span(&key, 1)).at<gtsam::Pose3>(key);
 }
+
+gtsam::Pose3 IncrementalSolver::linearisation_point(std::uint64_t key) const { return impl_->linearisation_point(key); }
 
 double IncrementalSolver::half_chi_square() {
   double sum = 0.0;
@@ -278,6 +333,10 @@ double IncrementalSolver::half_chi_square() {
 }
 
 double IncrementalSolver::half_chi_square(FactorId factor) { return impl_->error_of(factor); }
+
+double IncrementalSolver::half_chi_square(const gtsam::NonlinearFactor& factor) {
+  return factor.error(impl_->around(factor, {}));
+}
 
 std::optional<Eigen::MatrixXd> IncrementalSolver::marginal_covariance(std::uint64_t key) const {
   if (!impl_->broken.empty()) return std::nullopt;  // iSAM2 then lacks variables that its cliques name

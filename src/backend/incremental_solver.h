@@ -14,6 +14,7 @@
 #include "common/pose.h"
 
 namespace gtsam {
+class NonlinearFactor;
 class NonlinearFactorGraph;
 class Pose3;
 class Values;
@@ -73,17 +74,28 @@ class IncrementalSolver {
   /// Takes factors out again. Must not leave a variable without factors.
   [[nodiscard]] SolverOutcome remove(std::span<const FactorId> factors);
 
+  /// Ends the estimation of variables: from now on they are known to be where the solution has them, and their factors
+  /// say what they then say of the others. Later factors may name them. False when what is left cannot be solved, and
+  /// then nothing has changed. Costs as much as building iSAM2 anew.
+  [[nodiscard]] bool fix(std::span<const std::uint64_t> keys);
+
+  /// Variables that were fixed before, for a solver that begins anew.
+  void add_fixed(const gtsam::Values& values);
+
+  /// What was fixed, and where.
+  [[nodiscard]] const gtsam::Values& fixed() const;
+
   /// Further updates without news, after a large correction; fewer when nothing is left to linearise anew. False when
   /// the solver had to be rebuilt.
   bool settle(int updates);
 
-  /// The current solution; valid until the next call that changes the graph.
+  /// The current solution of what is not fixed; valid until the next call that changes the graph.
   [[nodiscard]] const gtsam::Values& estimate();
 
   /// Keys of the variables that the solution has moved since the last call, ascending.
   [[nodiscard]] std::vector<std::uint64_t> take_changed();
 
-  /// Keys of the variables that are linearised elsewhere than at the last call, or new, ascending.
+  /// Keys of the variables that are linearised elsewhere than at the last call, or new, or fixed since, ascending.
   [[nodiscard]] std::vector<std::uint64_t> take_relinearised();
 
   /// Where the factors are linearised. A solver that begins with these values and the same factors has the same
@@ -93,17 +105,21 @@ class IncrementalSolver {
   /// The same, but only the variables `keys` are brought up to date: others may be older. They must exist.
   [[nodiscard]] const gtsam::Values& estimate_of(std::span<const std::uint64_t> keys);
 
-  /// One pose of it, without the cost of all the others. The variable must exist.
+  /// One pose of it, without the cost of all the others, fixed or not. The variable must exist.
   [[nodiscard]] gtsam::Pose3 pose(std::uint64_t key);
 
-  /// Half chi-square at the current solution, of the whole graph and of one factor.
+  /// Where the factors are linearised in one pose, fixed or not. The variable must exist.
+  [[nodiscard]] gtsam::Pose3 linearisation_point(std::uint64_t key) const;
+
+  /// Half chi-square at the current solution, of the whole graph, of one factor, and of one that is not in the graph.
   [[nodiscard]] double half_chi_square();
   [[nodiscard]] double half_chi_square(FactorId factor);
+  [[nodiscard]] double half_chi_square(const gtsam::NonlinearFactor& factor);
 
   /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
   [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
 
-  /// Two pose variables.
+  /// Two pose variables, of which one may be fixed.
   using KeyPair = std::pair<std::uint64_t, std::uint64_t>;
 
   /// Covariance of the relative poses of pairs of pose variables, six rows and columns for each, in body axes of the
@@ -120,8 +136,8 @@ class IncrementalSolver {
   /// The factors in the graph. They are immutable, so copies of the list share them.
   [[nodiscard]] gtsam::NonlinearFactorGraph living_factors() const;
 
-  /// Linearises everything anew at `values`, which must hold every variable. False when the solver refused them; then
-  /// it goes on from where it was.
+  /// Linearises everything anew at `values`, which must hold every variable that is not fixed. False when the solver
+  /// refused them; then it goes on from where it was.
   [[nodiscard]] bool restart_at(const gtsam::Values& values);
 
   /// Why nothing is accepted any more: not even a fresh iSAM2 solves the factors. Empty while all is well.

@@ -41,13 +41,13 @@ SolverOutcome insert(const KeyframeLink& link, const BackendConfig& config, Incr
 }
 
 SolverOutcome insert_first(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
-                           GraphNode& node) {
-  node.link = first_link(keyframe, config);
-  return insert(node.link, config, solver);
+                           KeyframeLink& link) {
+  link = first_link(keyframe, config);
+  return insert(link, config, solver);
 }
 
 SolverOutcome insert_next(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
-                          SmootherState& state, GraphNode& node, std::string& left_out) {
+                          SmootherState& state, GraphNode& node, KeyframeLink& link, std::string& left_out) {
   LinkEnd previous = state.nodes.back().end;
   previous.estimate = estimate_of(solver, previous.id);
   // The information belongs to the interval since id - 1 and says nothing about a longer one.
@@ -58,13 +58,13 @@ SolverOutcome insert_next(const Keyframe& keyframe, const BackendConfig& config,
   }
   node.odometry = odometry.rows() > 0 ? odometry : loose_rows(config);
   const std::optional<std::string> obstacle = imu_obstacle(keyframe, previous, config.imu);
-  node.link = next_link(keyframe, previous, !obstacle, odometry, config);
-  SolverOutcome outcome = insert(node.link, config, solver);
+  link = next_link(keyframe, previous, !obstacle, odometry, config);
+  SolverOutcome outcome = insert(link, config, solver);
   if (outcome.accepted && !obstacle) return outcome;
   left_out = "linked without IMU: " + obstacle.value_or(outcome.reason);
   if (!obstacle) {
-    node.link = next_link(keyframe, previous, false, odometry, config);
-    outcome = insert(node.link, config, solver);
+    link = next_link(keyframe, previous, false, odometry, config);
+    outcome = insert(link, config, solver);
   }
   if (outcome.accepted) ++state.stats.without_imu;
   return outcome;
@@ -105,14 +105,16 @@ bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state) {
 
 SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,
                               SmootherState& state, std::string& left_out) {
-  GraphNode node{{keyframe.id, keyframe.state, {}}, {}, pose_covariance(keyframe), {}};
-  SolverOutcome outcome = state.nodes.empty() ? insert_first(keyframe, config, solver, node)
-                                              : insert_next(keyframe, config, solver, state, node, left_out);
+  GraphNode node{{keyframe.id, keyframe.state, {}}, {}, pose_covariance(keyframe)};
+  KeyframeLink link;
+  SolverOutcome outcome = state.nodes.empty() ? insert_first(keyframe, config, solver, link)
+                                              : insert_next(keyframe, config, solver, state, node, link, left_out);
   if (!outcome.accepted) return outcome;
   state.session = keyframe.session;
   state.expected_id = keyframe.id + 1;
   state.angular_rate = keyframe.state.angular_rate;
   state.nodes.push_back(std::move(node));
+  state.links.push_back(std::move(link));
   state.clouds.add(keyframe.id, compact(one_per_voxel(keyframe.cloud, config.cloud_voxel_m)));
   return outcome;
 }

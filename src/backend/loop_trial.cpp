@@ -44,7 +44,7 @@ LoopEntry enter_graph(GraphLoop loop, const BackendConfig& config, IncrementalSo
   const double bound = ChiSquareBounds(config.loop_consistency_probability).of(loop.rows.rows());
   // The graph's chi-square cannot rise by more than what the loop would cost if nothing gave way. Where that is little,
   // as among the hundreds of loops of a place that is driven again and again, nobody need add up all factors.
-  double rise = 2.0 * factors.error(solver.estimate_of(factors.front()->keys()));
+  double rise = 2.0 * solver.half_chi_square(*factors.front());
   const bool may_contradict = !(rise <= bound);
   const double before = may_contradict ? solver.half_chi_square() : 0.0;
   const SolverOutcome outcome = solver.add(factors, {});

@@ -8,6 +8,7 @@
 #include "backend/axis_doubt.h"
 #include "backend/gtsam_conversion.h"
 #include "backend/keyframe_factors.h"
+#include "backend/keyframe_retirement.h"
 
 namespace ignis {
 namespace {
@@ -62,7 +63,7 @@ void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUp
   update.newest.angular_rate = state.angular_rate;
   if (!update.accepted()) return;
   if (const auto covariance = solver.marginal_covariance(X(end.id))) {
-    update.covariance = with_axis_doubt(*covariance);
+    update.covariance = with_axis_doubt(since_start(*covariance, state));
     update.covariance_valid = true;
   }
   list_moved(state, update);
@@ -77,6 +78,7 @@ PoseGraph exported_graph(const SmootherState& state) {
     graph.edges.push_back(
         {state.nodes[i - 1].end.id, state.nodes[i].end.id, T_from_to, rows.transpose() * rows, false});
   }
+  graph.edges.insert(graph.edges.end(), state.retired.loops.begin(), state.retired.loops.end());
   for (const GraphLoop& loop : state.loops) {
     graph.edges.push_back(
         {loop.result.to_id, loop.result.from_id, loop.result.T_to_from, loop.rows.transpose() * loop.rows, true});

@@ -68,8 +68,8 @@ std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optim
   gtsam::Values values;
   gtsam::Pose3 T_new_old;
   std::size_t carried = 0;
-  for (const GraphNode& node : state.nodes) {
-    const std::int32_t id = node.end.id;
+  for (std::size_t i = state.retired.count; i < state.nodes.size(); ++i) {
+    const std::int32_t id = state.nodes[i].end.id;
     const auto before = now.at<gtsam::Pose3>(X(id));
     if (solved.exists(X(id))) {
       T_new_old = solved.at<gtsam::Pose3>(X(id)) * before.inverse();
@@ -116,7 +116,7 @@ ShadowProblem shadow_problem(IncrementalSolver& solver, const SmootherState& sta
   auto graph = std::make_shared<ShadowProblem::Graph>();
   graph->factors = solver.living_factors();
   graph->estimate = solver.estimate();
-  for (const GraphNode& node : state.nodes) graph->ids.push_back(node.end.id);
+  for (std::size_t i = state.retired.count; i < state.nodes.size(); ++i) graph->ids.push_back(state.nodes[i].end.id);
   graph->revision = state.revision;
   return {std::move(graph)};
 }

@@ -8,6 +8,7 @@
 #include "backend/incremental_solver.h"
 #include "backend/information.h"
 #include "backend/keyframe_chain.h"
+#include "backend/keyframe_retirement.h"
 #include "backend/loop_admission.h"
 #include "backend/loop_search.h"
 #include "backend/revision_report.h"
@@ -51,8 +52,10 @@ struct Smoother::Impl {
     }
   }
 
-  void review(SmootherUpdate& update) {
-    for (GraphLoop& event : review_loops(config, solver, state)) update.changed.push_back(std::move(event.result));
+  void review(SmootherUpdate& update) { note(review_loops(config, solver, state), update); }
+
+  static void note(LoopEvents events, SmootherUpdate& update) {
+    for (GraphLoop& event : events) update.changed.push_back(std::move(event.result));
   }
 
   BackendConfig config;
@@ -91,6 +94,7 @@ SmootherUpdate Smoother::add_keyframe(const Keyframe& keyframe) {
     follow_nodes(state, config);
     impl_->close_loop(update);
     impl_->review(update);
+    impl_->note(retire_oldest(config, solver, state), update);
     ++state.revision;
   }
   count_verdict(update.verdict, state);
@@ -140,9 +144,9 @@ SmootherUpdate Smoother::withdraw_loop(std::int32_t from_id, std::int32_t to_id)
   SmootherState& state = impl_->state;
   SmootherUpdate update;
   update.verdict = KeyframeVerdict::kAccepted;
-  for (GraphLoop& event : dismiss_loops(from_id, to_id, solver, state))
-    update.changed.push_back(std::move(event.result));
+  impl_->note(dismiss_loops(from_id, to_id, solver, state), update);
   if (!update.changed.empty()) ++state.revision;
+  update.loop = retired_loop(from_id, to_id, state);
   report_revision(solver, state, update);
   return update;
 }
@@ -177,7 +181,8 @@ PoseGraph Smoother::pose_graph() const { return exported_graph(impl_->state); }
 SmootherStats Smoother::stats() const {
   SmootherStats stats = impl_->state.stats;
   stats.keyframes = static_cast<int>(impl_->state.nodes.size());
-  stats.loops_kept = static_cast<int>(impl_->state.loops.size());
+  stats.retired = static_cast<int>(impl_->state.retired.count);
+  stats.loops_kept = static_cast<int>(impl_->state.loops.size() + impl_->state.retired.loops.size());
   stats.loops_on_trial = static_cast<int>(std::ranges::count(impl_->state.loops, LoopStage::kOnTrial,
                                                              [](const GraphLoop& loop) { return loop.result.stage; }));
   stats.loops_waiting = static_cast<int>(impl_->state.waiting.size());

@@ -40,7 +40,7 @@ struct SmootherUpdate {
   Matrix6d covariance = Matrix6d::Zero();  ///< of the newest pose in map; attitude then position, body axes
   bool covariance_valid = false;
   NavState newest;                 ///< state of the newest keyframe in map (fields named odom are map here)
-  std::optional<LoopResult> loop;  ///< of this keyframe
+  std::optional<LoopResult> loop;  ///< of this keyframe, or the one that a command cannot take out
   std::vector<LoopResult>
       changed;  ///< other loops that entered or left the graph, were kept or wait for another reason
 
@@ -50,6 +50,7 @@ struct SmootherUpdate {
 /// Counters since construction.
 struct SmootherStats {
   int keyframes = 0;
+  int retired = 0;          ///< of these, the oldest, that stay where they are
   int loops_kept = 0;       ///< in the graph, on trial or kept
   int loops_on_trial = 0;   ///< of these, on trial
   int loops_waiting = 0;    ///< verified, but outside of the graph
@@ -78,9 +79,10 @@ struct LoopMeasurement {
 
 struct SmootherRestoration;
 
-/// Fixed-history smoother over keyframes: pose, velocity and biases of each, linked by preintegrated IMU, by what scan
-/// matching alone says of the relative motion, by zero velocity at rest, and by loops. Frame map equals frame odom at
-/// the first keyframe and drifts away from it as odometry does. World +Y up.
+/// Smoother over the newest `estimated_keyframes` keyframes, with those before them as known places: pose, velocity and
+/// biases of each, linked by preintegrated IMU, by what scan matching alone says of the relative motion, by zero
+/// velocity at rest, and by loops. Frame map equals frame odom at the first keyframe and drifts away from it as
+/// odometry does. World +Y up.
 ///
 /// A loop enters when it agrees with odometry and belongs to the largest set of loops that agree with each other. It is
 /// on trial at first, then kept; whichever loop the evidence contradicts is taken out again, however old it is.
@@ -108,7 +110,8 @@ class Smoother {
   /// Puts a loop on trial as if it had been found here. `loop` tells the outcome.
   [[nodiscard]] SmootherUpdate add_loop(const LoopMeasurement& measurement);
 
-  /// Takes every loop between the two keyframes out, wherever it stands. The search may find it again.
+  /// Takes every loop between the two keyframes out, wherever it stands. The search may find it again. One between
+  /// keyframes that have retired stays, and `loop` says so.
   [[nodiscard]] SmootherUpdate withdraw_loop(std::int32_t from_id, std::int32_t to_id);
 
   /// The same, and neither the pair nor its neighbours within loop_min_spacing are ever closed again.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/unordered/unordered_flat_map.hpp>
+#include <deque>
 #include <vector>
 
 #include "backend/cloud_store.h"
@@ -11,6 +12,7 @@
 #include "backend/loop_result.h"
 #include "backend/odometry_chain.h"
 #include "backend/place_index.h"
+#include "backend/pose_graph_file.h"
 #include "backend/smoother.h"
 
 namespace ignis {
@@ -20,7 +22,6 @@ struct GraphNode {
   LinkEnd end;
   WhiteningRows odometry;                       ///< of the link to the previous node, for the exported graph
   Matrix6d pose_covariance = Matrix6d::Zero();  ///< the front end's, of T_odom_body; attitude then position, body axes
-  KeyframeLink link;                            ///< what its factors are made of
 };
 
 /// A loop that the match has verified.
@@ -41,10 +42,19 @@ struct LoopVeto {
   bool operator==(const LoopVeto&) const = default;
 };
 
+/// Keyframes that are estimated no more (keyframe_retirement.h).
+struct RetiredKeyframes {
+  std::size_t count = 0;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of all of them, as one: attitude then position, in axes of map
+  std::vector<PoseGraphEdge> loops;        ///< that were in the graph between them
+};
+
 /// All that the smoother knows besides the solver's factors and values. Plain data; the functions that change it stand
 /// in keyframe_chain.h, loop_*.h and revision_report.h. The vectors of one element per node share their indices.
 struct SmootherState {
   std::vector<GraphNode> nodes;
+  RetiredKeyframes retired;         ///< the oldest of them
+  std::deque<KeyframeLink> links;   ///< of the others: what their factors are made of
   CloudStore clouds;                ///< body frame, one per node
   std::vector<KeyframePose> poses;  ///< as the graph places them, one per node
   std::vector<Pose> published;      ///< as last listed in an update
