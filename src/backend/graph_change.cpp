@@ -54,9 +54,15 @@ void transfer(auto& io, FieldsOf<PoseGraphEdge> auto& edge) {
   io.number(edge.is_loop);
 }
 
+void transfer(auto& io, FieldsOf<RetiredBlock> auto& block) {
+  io.number(block.until);
+  io.matrix(block.covariance);
+}
+
 void transfer(auto& io, FieldsOf<RetiredKeyframes> auto& retired) {
-  io.number(retired.count);
-  io.matrix(retired.covariance);
+  io.list(retired.blocks);
+  io.matrix(retired.newest_motion.mean);
+  io.matrix(retired.newest_motion.covariance);
   io.list(retired.loops);
 }
 
@@ -132,9 +138,9 @@ std::string chain_problem(const SmootherState& state, const GraphChange& change)
   if (!state.nodes.empty() && news.session != state.session) return "the session changes";
   std::int32_t previous = state.nodes.empty() ? -1 : state.nodes.back().end.id;
   const std::size_t nodes = state.nodes.size() + news.nodes.size();
-  const std::size_t retired = change.retired ? change.retired->count : state.retired.count;
-  if (change.retired && (retired <= state.retired.count || retired >= nodes))
-    return std::format("{} of {} keyframes have retired, after {}", retired, nodes, state.retired.count);
+  const std::size_t retired = change.retired ? change.retired->count() : state.retired.count();
+  if (change.retired && (retired <= state.retired.count() || retired >= nodes))
+    return std::format("{} of {} keyframes have retired, after {}", retired, nodes, state.retired.count());
   // Those that came and retired within one change have no links any more.
   if (news.links.size() != std::min(news.nodes.size(), nodes - retired)) return "links of keyframes are missing";
   const std::size_t first_linked = news.nodes.size() - news.links.size();
@@ -199,12 +205,12 @@ std::string RestoredGraph::apply(GraphChange change) {
   std::ranges::move(change.state.vetoes, std::back_inserter(state.vetoes));
   if (change.retired) {
     std::ranges::move(change.retired->loops, std::back_inserter(state.retired.loops));
-    state.retired.count = change.retired->count;
-    state.retired.covariance = change.retired->covariance;
+    std::ranges::move(change.retired->blocks, std::back_inserter(state.retired.blocks));
+    state.retired.newest_motion = change.retired->newest_motion;
   }
   copy_scalars(change.state, state);
   std::ranges::move(change.state.links, std::back_inserter(state.links));
-  while (state.links.size() > state.nodes.size() - state.retired.count) state.links.pop_front();
+  while (state.links.size() > state.nodes.size() - state.retired.count()) state.links.pop_front();
   return {};
 }
 
@@ -212,7 +218,7 @@ ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph()) {}
 
 ChangeTracker::ChangeTracker(const RestoredGraph& known)
     : nodes_(known.state.nodes.size()),
-      retired_(known.state.retired.count),
+      retired_blocks_(known.state.retired.blocks.size()),
       retired_loops_(known.state.retired.loops.size()),
       vetoes_(known.state.vetoes.size()) {
   static_cast<void>(loops_.next(known.state.loops));
@@ -229,14 +235,16 @@ GraphChange ChangeTracker::next(const SmootherState& state, std::vector<Linearis
   const auto linked = std::min(std::ssize(state.links), std::ssize(state.nodes) - static_cast<std::ptrdiff_t>(nodes_));
   change.state.links.assign(state.links.end() - linked, state.links.end());
   nodes_ = state.nodes.size();
-  if (state.retired.count != retired_) {
+  const RetiredKeyframes& retired = state.retired;
+  if (retired.blocks.size() > retired_blocks_) {
     change.retired = {
-        state.retired.count,
-        state.retired.covariance,
-        {state.retired.loops.begin() + static_cast<std::ptrdiff_t>(retired_loops_), state.retired.loops.end()}};
+        {retired.blocks.begin() + static_cast<std::ptrdiff_t>(retired_blocks_), retired.blocks.end()},
+        retired.newest_motion,
+        {retired.loops.begin() + static_cast<std::ptrdiff_t>(retired_loops_), retired.loops.end()},
+    };
   }
-  retired_ = state.retired.count;
-  retired_loops_ = state.retired.loops.size();
+  retired_blocks_ = retired.blocks.size();
+  retired_loops_ = retired.loops.size();
   change.state.vetoes.assign(state.vetoes.begin() + static_cast<std::ptrdiff_t>(vetoes_), state.vetoes.end());
   vetoes_ = state.vetoes.size();
   copy_scalars(state, change.state);

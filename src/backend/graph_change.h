@@ -25,7 +25,7 @@ struct GraphChange {
   /// Scalars as they are now; nodes and vetoes: the new ones; links: those of new nodes that have not retired; no
   /// loops.
   SmootherState state;
-  std::optional<RetiredKeyframes> retired;     ///< if more have; their loops: the new ones
+  std::optional<RetiredKeyframes> retired;     ///< if more have; blocks and loops: the new ones
   std::vector<CompactCloud> clouds;            ///< one per new node
   LoopListChange loops;                        ///< those in the graph
   LoopListChange waiting;                      ///< those outside of it
@@ -61,7 +61,7 @@ class ChangeTracker {
 
  private:
   std::size_t nodes_ = 0;
-  std::size_t retired_ = 0;
+  std::size_t retired_blocks_ = 0;
   std::size_t retired_loops_ = 0;
   LoopListMemory loops_;
   LoopListMemory waiting_;

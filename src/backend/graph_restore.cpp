@@ -8,22 +8,48 @@
 #include <set>
 
 #include "backend/keyframe_factors.h"
+#include "backend/keyframe_retirement.h"
 #include "backend/relative_pose_factor.h"
 #include "backend/revision_report.h"
 
 namespace ignis {
 
+using gtsam::symbol_shorthand::B;
+using gtsam::symbol_shorthand::V;
 using gtsam::symbol_shorthand::X;
+
+namespace {
+
+/// Or where it stays. Of the newest keyframe that has retired the pose is fixed and the rest is not.
+NavState linearised_at(std::int32_t id, const IncrementalSolver& solver) {
+  const gtsam::Values& estimated = solver.linearisation_points();
+  const gtsam::Values& fixed = solver.fixed();
+  gtsam::Values values;
+  for (const gtsam::Key key : {X(id), V(id), B(id)})
+    values.insert(key, (fixed.exists(key) ? fixed : estimated).at(key));
+  return estimate_of(values, id);
+}
+
+/// Sorts what is fixed from what is estimated.
+void insert_point(const LinearisationPoint& point, std::size_t place, const RetiredKeyframes& retired,
+                  gtsam::Values& estimated, gtsam::Values& fixed) {
+  gtsam::Values all;
+  insert_estimate(point.id, point.state, all);
+  for (const gtsam::Key key : all.keys()) {
+    const bool is_fixed = place + 1 < retired.count() || (place + 1 == retired.count() && key == X(point.id));
+    (is_fixed ? fixed : estimated).insert(key, all.at(key));
+  }
+}
+
+}  // namespace
 
 std::vector<LinearisationPoint> take_linearised(IncrementalSolver& solver) {
   std::set<std::int32_t> ids;  // of whichever of a keyframe's variables
   for (const gtsam::Key key : solver.take_relinearised()) {
     ids.insert(static_cast<std::int32_t>(gtsam::Symbol(key).index()));
   }
-  const gtsam::Values& estimated = solver.linearisation_points();
-  const gtsam::Values& fixed = solver.fixed();
   std::vector<LinearisationPoint> points;
-  for (const std::int32_t id : ids) points.push_back({id, estimate_of(fixed.exists(X(id)) ? fixed : estimated, id)});
+  for (const std::int32_t id : ids) points.push_back({id, linearised_at(id, solver)});
   return points;
 }
 
@@ -33,22 +59,21 @@ std::string restore_solver(RestoredGraph& graph, const BackendConfig& config, In
   gtsam::NonlinearFactorGraph factors;
   gtsam::Values values;
   gtsam::Values fixed;
+  add_retired_motion(state, factors);
   for (const KeyframeLink& link : state.links) add_link_factors(link, config, factors);
   for (const GraphLoop& loop : state.loops) {
     factors.push_back(
         make_relative_pose_factor(X(loop.result.to_id), X(loop.result.from_id), loop.result.T_to_from, loop.rows));
   }
-  for (std::size_t i = 0; i < graph.linearised.size(); ++i) {
-    const LinearisationPoint& point = graph.linearised[i];
-    insert_estimate(point.id, point.state, i < state.retired.count ? fixed : values);
-  }
+  for (std::size_t i = 0; i < graph.linearised.size(); ++i)
+    insert_point(graph.linearised[i], i, state.retired, values, fixed);
   solver.add_fixed(fixed);
   const SolverOutcome outcome = solver.add(factors, values);
   if (!outcome.accepted) return outcome.reason;
   static_cast<void>(solver.take_relinearised());  // the journal has them
   const std::size_t first_loop = outcome.factors.size() - state.loops.size();
   for (std::size_t i = 0; i < state.loops.size(); ++i) state.loops[i].factor = outcome.factors[first_loop + i];
-  for (std::size_t i = 0; i < state.retired.count; ++i)
+  for (std::size_t i = 0; i < state.retired.count(); ++i)
     state.poses.push_back({state.nodes[i].end.id, graph.linearised[i].state.T_odom_body});
   refresh_poses(solver, state);
   return {};

@@ -75,9 +75,10 @@ class IncrementalSolver {
   [[nodiscard]] SolverOutcome remove(std::span<const FactorId> factors);
 
   /// Ends the estimation of variables: from now on they are known to be where the solution has them, and their factors
-  /// say what they then say of the others. Later factors may name them. False when what is left cannot be solved, and
-  /// then nothing has changed. Costs as much as building iSAM2 anew.
-  [[nodiscard]] bool fix(std::span<const std::uint64_t> keys);
+  /// say what they then say of the others. Later factors may name them. What is left to speak of the variables of
+  /// `instead` alone is taken out, for `instead` says all that. False when the graph cannot be solved then, and nothing
+  /// has changed. Costs as much as building iSAM2 anew.
+  [[nodiscard]] bool fix(std::span<const std::uint64_t> keys, const gtsam::NonlinearFactorGraph& instead);
 
   /// Variables that were fixed before, for a solver that begins anew.
   void add_fixed(const gtsam::Values& values);
@@ -118,6 +119,11 @@ class IncrementalSolver {
 
   /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
   [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
+
+  /// Joint covariance of `wanted`, one below the other, by those factors alone that name none but `keys` and what is
+  /// fixed. Nothing where these leave something open.
+  [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_among(std::span<const std::uint64_t> keys,
+                                                                std::span<const std::uint64_t> wanted);
 
   /// Two pose variables, of which one may be fixed.
   using KeyPair = std::pair<std::uint64_t, std::uint64_t>;

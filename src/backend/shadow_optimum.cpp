@@ -20,8 +20,6 @@
 
 namespace ignis {
 
-using gtsam::symbol_shorthand::B;
-using gtsam::symbol_shorthand::V;
 using gtsam::symbol_shorthand::X;
 
 struct ShadowProblem::Graph {
@@ -65,22 +63,22 @@ std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optim
                                             const SmootherState& state) {
   const gtsam::Values& solved = optimum.values;
   const gtsam::Values& now = solver.estimate();
-  gtsam::Values values;
   gtsam::Pose3 T_new_old;
+  for (std::size_t i = state.retired.count(); i < state.nodes.size(); ++i) {
+    const gtsam::Key key = X(state.nodes[i].end.id);
+    if (solved.exists(key)) T_new_old = solved.at<gtsam::Pose3>(key) * now.at<gtsam::Pose3>(key).inverse();
+  }
+  gtsam::Values values = now;
   std::size_t carried = 0;
-  for (std::size_t i = state.retired.count; i < state.nodes.size(); ++i) {
-    const std::int32_t id = state.nodes[i].end.id;
-    const auto before = now.at<gtsam::Pose3>(X(id));
-    if (solved.exists(X(id))) {
-      T_new_old = solved.at<gtsam::Pose3>(X(id)) * before.inverse();
-      values.insert(X(id), solved.at<gtsam::Pose3>(X(id)));
-      values.insert(V(id), solved.at<gtsam::Vector3>(V(id)));
-      values.insert(B(id), solved.at<gtsam::imuBias::ConstantBias>(B(id)));
-      carried += 3;
-    } else {
-      values.insert(X(id), T_new_old * before);
-      values.insert(V(id), gtsam::Vector3(T_new_old.rotation().matrix() * now.at<gtsam::Vector3>(V(id))));
-      values.insert(B(id), now.at<gtsam::imuBias::ConstantBias>(B(id)));
+  for (const gtsam::Key key : now.keys()) {
+    const char letter = gtsam::Symbol(key).chr();
+    if (solved.exists(key)) {
+      values.update(key, solved.at(key));
+      ++carried;
+    } else if (letter == 'x') {
+      values.update(key, T_new_old * now.at<gtsam::Pose3>(key));
+    } else if (letter == 'v') {
+      values.update(key, gtsam::Vector3(T_new_old.rotation().matrix() * now.at<gtsam::Vector3>(key)));
     }
   }
   if (carried != solved.size()) return std::nullopt;
@@ -116,7 +114,7 @@ ShadowProblem shadow_problem(IncrementalSolver& solver, const SmootherState& sta
   auto graph = std::make_shared<ShadowProblem::Graph>();
   graph->factors = solver.living_factors();
   graph->estimate = solver.estimate();
-  for (std::size_t i = state.retired.count; i < state.nodes.size(); ++i) graph->ids.push_back(state.nodes[i].end.id);
+  for (std::size_t i = state.retired.count(); i < state.nodes.size(); ++i) graph->ids.push_back(state.nodes[i].end.id);
   graph->revision = state.revision;
   return {std::move(graph)};
 }

@@ -117,6 +117,8 @@ SmootherUpdate Smoother::add_loop(const LoopMeasurement& measurement) {
   const GraphNode* to = state.node_of(measurement.to_id);
   if (from == nullptr || to == nullptr || from == to) {
     result.reason_text = "the loop names keyframes that the graph does not hold";
+  } else if (std::max(state.place_of(from->end.id), state.place_of(to->end.id)) < state.retired.count()) {
+    result.reason_text = "both of the loop's keyframes have retired";
   } else if (!measurement.T_to_from.all_finite() || !measurement.information.allFinite()) {
     result.reason_text = "the loop is not finite";
   } else if (is_vetoed(state.vetoes, measurement.from_id, measurement.to_id, config.loop_min_spacing)) {
@@ -181,7 +183,7 @@ PoseGraph Smoother::pose_graph() const { return exported_graph(impl_->state); }
 SmootherStats Smoother::stats() const {
   SmootherStats stats = impl_->state.stats;
   stats.keyframes = static_cast<int>(impl_->state.nodes.size());
-  stats.retired = static_cast<int>(impl_->state.retired.count);
+  stats.retired = static_cast<int>(impl_->state.retired.count());
   stats.loops_kept = static_cast<int>(impl_->state.loops.size() + impl_->state.retired.loops.size());
   stats.loops_on_trial = static_cast<int>(std::ranges::count(impl_->state.loops, LoopStage::kOnTrial,
                                                              [](const GraphLoop& loop) { return loop.result.stage; }));

@@ -10,6 +10,7 @@
 #include "backend/keyframe_factors.h"
 #include "backend/keyframe_pose.h"
 #include "backend/loop_result.h"
+#include "backend/motion_factor.h"
 #include "backend/odometry_chain.h"
 #include "backend/place_index.h"
 #include "backend/pose_graph_file.h"
@@ -42,11 +43,19 @@ struct LoopVeto {
   bool operator==(const LoopVeto&) const = default;
 };
 
+/// Keyframes that retired at once.
+struct RetiredBlock {
+  std::size_t until = 0;                   ///< place of the first keyframe behind it
+  Matrix6d covariance = Matrix6d::Zero();  ///< of its keyframes as one: attitude then position, in axes of map
+};
+
 /// Keyframes that are estimated no more (keyframe_retirement.h).
 struct RetiredKeyframes {
-  std::size_t count = 0;
-  Matrix6d covariance = Matrix6d::Zero();  ///< of all of them, as one: attitude then position, in axes of map
-  std::vector<PoseGraphEdge> loops;        ///< that were in the graph between them
+  std::vector<RetiredBlock> blocks;  ///< in the order of their keyframes
+  Motion newest_motion;              ///< of the newest of them: velocity and biases are not taken for known
+  std::vector<PoseGraphEdge> loops;  ///< that were in the graph between them
+
+  [[nodiscard]] std::size_t count() const { return blocks.empty() ? 0 : blocks.back().until; }
 };
 
 /// All that the smoother knows besides the solver's factors and values. Plain data; the functions that change it stand

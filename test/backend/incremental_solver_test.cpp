@@ -166,5 +166,101 @@ TEST(IncrementalSolver, ConstrainsOnlyTheDirectionsGiven) {
   EXPECT_NEAR(std::sqrt((*covariance)(3, 3)), 1e-3, 1e-4);
 }
 
+/// A chain with loops, part of it fixed, beside one that holds the same part by priors as good as exact.
+TEST(IncrementalSolver, WhatIsFixedStaysAndTheRestIsThatOfAnExactPrior) {
+  SolverChain chain;
+  SolverChain held;
+  const SolverConfig at_the_solution{.relinearize_position_m = 1e-6, .relinearize_rotation_rad = 1e-6};
+  chain.solver = IncrementalSolver(at_the_solution);
+  held.solver = IncrementalSolver(at_the_solution);
+  const auto add_loop = [](SolverChain& to, int from, int earlier, double off) {
+    gtsam::NonlinearFactorGraph loop;
+    Pose3 T;
+    for (int i = earlier; i < from; ++i) T = T * step();
+    T = T * Pose3(gtsam::Rot3(), {off, 0.0, -off});
+    loop.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(earlier), X(from), T, kNoise);
+    EXPECT_TRUE(to.solver.add(loop, {}).accepted);
+  };
+  for (SolverChain* each : {&chain, &held}) {
+    each->extend_to(20);
+    add_loop(*each, 15, 3, 0.05);
+    each->solver.settle(3);
+  }
+  std::vector<gtsam::Key> known;
+  gtsam::NonlinearFactorGraph priors;
+  for (int i = 0; i < 8; ++i) {
+    known.push_back(X(i));
+    priors.addPrior(X(i), held.pose(i), gtsam::noiseModel::Isotropic::Sigma(6, 1e-6));
+  }
+  const Pose3 before = chain.pose(7);
+  ASSERT_TRUE(chain.solver.fix(known, {}));
+  ASSERT_TRUE(held.solver.add(priors, {}).accepted);
+  EXPECT_EQ(chain.solver.estimate().size(), 12U);
+  add_loop(chain, 18, 12, 0.1);
+  add_loop(held, 18, 12, 0.1);
+  gtsam::NonlinearFactorGraph to_known;  // a later factor names what is fixed
+  to_known.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(2), X(19), before.between(before), kNoise);
+  ASSERT_TRUE(chain.solver.add(to_known, {}).accepted);
+  ASSERT_TRUE(held.solver.add(to_known, {}).accepted);
+  chain.solver.settle(10);
+  held.solver.settle(10);
+  EXPECT_TRUE(chain.solver.pose(X(7)).equals(before, 0.0));
+  for (int i = 8; i < 20; ++i) EXPECT_LT(chain.pose(i).localCoordinates(held.pose(i)).norm(), 1e-6) << i;
+  const auto covariance = chain.solver.marginal_covariance(X(19));
+  const auto expected = held.solver.marginal_covariance(X(19));
+  ASSERT_TRUE(covariance && expected);
+  EXPECT_TRUE(covariance->isApprox(*expected, 1e-3));
+  const std::vector<IncrementalSolver::KeyPair> pairs{{X(2), X(19)}};
+  EXPECT_TRUE(chain.solver.relative_covariance(pairs).isApprox(held.solver.relative_covariance(pairs), 1e-3));
+}
+
+TEST(IncrementalSolver, RefusesAFactorOnWhatIsFixedAlone) {
+  SolverChain chain;
+  chain.extend_to(6);
+  ASSERT_TRUE(chain.solver.fix(std::vector<gtsam::Key>{X(0), X(1), X(2)}, {}));
+  gtsam::NonlinearFactorGraph known;
+  known.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(0), X(2), step() * step(), kNoise);
+  const SolverOutcome outcome = chain.solver.add(known, {});
+  EXPECT_FALSE(outcome.accepted);
+  EXPECT_TRUE(contains(outcome.reason, "names only what is fixed"));
+  gtsam::Values again;
+  again.insert(X(1), Pose3());
+  EXPECT_TRUE(contains(chain.solver.add({}, again).reason, "x1 exists"));
+}
+
+TEST(IncrementalSolver, FixesNothingWhereTheRestCouldNotBeSolved) {
+  SolverChain chain;
+  chain.extend_to(6);
+  gtsam::NonlinearFactorGraph instead;  // takes the place of all that speaks of pose 3, and leaves its attitude open
+  WhiteningRows position_only = WhiteningRows::Zero(3, 6);
+  position_only.rightCols<3>().setIdentity();
+  instead.push_back(make_relative_pose_factor(X(2), X(3), Pose(), position_only));
+  EXPECT_FALSE(chain.solver.fix(std::vector<gtsam::Key>{X(0), X(1), X(2), X(4), X(5)}, instead));
+  EXPECT_EQ(chain.solver.estimate().size(), 6U);
+  EXPECT_EQ(chain.solver.failure(), "");
+  chain.extend_to(10);
+  expect_good_chain(chain, 10);
+}
+
+/// The past of a chain says of its end what the whole chain says before the future comes.
+TEST(IncrementalSolver, CovarianceAmongVariablesLeavesAllOthersOut) {
+  SolverChain past;
+  past.extend_to(6);
+  SolverChain chain;
+  chain.extend_to(12);
+  gtsam::NonlinearFactorGraph future;
+  future.addPrior(X(9), chain.pose(9), gtsam::noiseModel::Isotropic::Sigma(6, 1e-3));
+  ASSERT_TRUE(chain.solver.add(future, {}).accepted);
+  std::vector<gtsam::Key> keys;
+  for (int i = 0; i < 6; ++i) keys.push_back(X(i));
+  const auto among = chain.solver.covariance_among(keys, std::vector<gtsam::Key>{X(5), X(4)});
+  ASSERT_TRUE(among);
+  ASSERT_EQ(among->rows(), 12);
+  EXPECT_TRUE((among->topLeftCorner<6, 6>().isApprox(past.solver.marginal_covariance(X(5)).value(), 1e-6)));
+  EXPECT_TRUE((among->bottomRightCorner<6, 6>().isApprox(past.solver.marginal_covariance(X(4)).value(), 1e-6)));
+  EXPECT_FALSE(chain.solver.covariance_among(std::vector<gtsam::Key>{X(4), X(5)}, std::vector<gtsam::Key>{X(5)}))
+      << "without the prior nothing holds them";
+}
+
 }  // namespace
 }  // namespace ignis

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <random>
+#include <tuple>
 
 #include "backend/graph_change.h"
 #include "backend/smoother.h"
@@ -72,6 +73,7 @@ std::vector<Step> random_steps(const testing::Drive& drive, std::mt19937& random
 void expect_same(const Smoother& a, const Smoother& b) {
   EXPECT_EQ(a.revision(), b.revision());
   EXPECT_EQ(a.expected_id(), b.expected_id());
+  EXPECT_EQ(a.stats().retired, b.stats().retired);
   EXPECT_EQ(a.stats().loops_kept, b.stats().loops_kept);
   EXPECT_EQ(a.stats().loops_withdrawn, b.stats().loops_withdrawn);
   EXPECT_EQ(a.stats().without_imu, b.stats().without_imu);
@@ -94,21 +96,25 @@ void expect_same(const Smoother& a, const Smoother& b) {
 }
 
 /// Histories with gaps leave odometry vague; here their loops enter all the same, on any second loop's word.
-BackendConfig trusting() {
+BackendConfig trusting(int estimated_keyframes = 1000) {
   BackendConfig config;
+  config.estimated_keyframes = estimated_keyframes;
   config.loop_support_beyond_m = 2.0;
   config.loop_support_apart_m = 0.0;
   return config;
 }
 
-class SmootherJournal : public ::testing::TestWithParam<unsigned> {};
+/// Seed, and keyframes that are estimated at most.
+class SmootherJournal : public ::testing::TestWithParam<std::tuple<unsigned, int>> {};
 
 TEST_P(SmootherJournal, KilledAnywhereEndsWithTheSameGraph) {
-  std::mt19937 random(GetParam());
-  const testing::Drive drive = testing::make_drive({.seed = GetParam(), .keyframes = 60, .cloud_points = 0});
+  const auto [seed, estimated_keyframes] = GetParam();
+  const BackendConfig config = trusting(estimated_keyframes);
+  std::mt19937 random(seed);
+  const testing::Drive drive = testing::make_drive({.seed = seed, .keyframes = 60, .cloud_points = 0});
   const std::vector<Step> steps = random_steps(drive, random);
-  Smoother uninterrupted{trusting(), LoopGates()};
-  Smoother killed{trusting(), LoopGates()};
+  Smoother uninterrupted{config, LoopGates()};
+  Smoother killed{config, LoopGates()};
   Records records;
   int kills = 0;
   for (const Step& step : steps) {
@@ -116,7 +122,7 @@ TEST_P(SmootherJournal, KilledAnywhereEndsWithTheSameGraph) {
     take(killed, step);
     records.push_back(killed.take_change());
     if (random() % 8 != 0) continue;
-    SmootherRestoration restoration = restored(records, trusting());
+    SmootherRestoration restoration = restored(records, config);
     EXPECT_EQ(restoration.problem, "");
     EXPECT_EQ(restoration.records_used, records.size());
     expect_same(killed, restoration.smoother);
@@ -125,10 +131,12 @@ TEST_P(SmootherJournal, KilledAnywhereEndsWithTheSameGraph) {
   }
   EXPECT_GE(kills, 3);
   EXPECT_GE(uninterrupted.stats().loops_kept, 3);
+  EXPECT_EQ(uninterrupted.stats().retired > 0, estimated_keyframes < 60);
   expect_same(uninterrupted, killed);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, SmootherJournal, ::testing::Range(1U, 13U));
+INSTANTIATE_TEST_SUITE_P(Seeds, SmootherJournal,
+                         ::testing::Combine(::testing::Range(1U, 13U), ::testing::Values(1000, 24)));
 
 TEST(SmootherJournalSearch, FindsTheSameLoopsAfterwards) {
   const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 45, .cloud_points = 3000});
