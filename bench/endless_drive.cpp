@@ -185,7 +185,8 @@ class Drive {
     map_.correct(update.T_map_odom, poses, update.revision);
     schedule_.note(update);
     if (!schedule_.begin_due()) return;
-    schedule_.begin(graph_.smoother().stats().keyframes);
+    const SmootherStats stats = graph_.smoother().stats();
+    schedule_.begin(stats.keyframes, stats.keyframes - stats.retired);
     problem_ = graph_.shadow_problem();
   }
 

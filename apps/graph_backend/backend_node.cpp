@@ -42,6 +42,11 @@ SmootherUpdate answered(SmootherUpdate update, const graph_command_t& command) {
   return update;
 }
 
+std::string retirement_note(const SmootherStats& stats) {
+  if (stats.retired == 0) return "";
+  return std::format("; the oldest {} of {} keyframes have retired", stats.retired, stats.keyframes);
+}
+
 }  // namespace
 
 BackendNode::BackendNode(const runtime::Application& application, const std::filesystem::path& journal_folder)
@@ -150,7 +155,8 @@ void BackendNode::adopt_due_optimum() {
 /// optimum.
 void BackendNode::begin_due_optimum() {
   if (!schedule_.begin_due()) return;
-  schedule_.begin(graph_.smoother().stats().keyframes);
+  const SmootherStats stats = graph_.smoother().stats();
+  schedule_.begin(stats.keyframes, stats.keyframes - stats.retired);
   optimum_.begin(graph_.shadow_problem());
 }
 
@@ -263,9 +269,10 @@ void BackendNode::publish_health() {
                                     "no loop ends there",
                                     stats.clouds_forgotten));
   } else if (stats.shadow_checks > 0) {
-    link_.report_health(newest_utime_, health_t::OK,
-                        std::format("OK: {:.1f} mm and {:.2f} mrad from the batch optimum at most; swapped {} times",
-                                    1e3 * stats.shadow_gap_m, 1e3 * stats.shadow_gap_rad, stats.shadow_swaps));
+    link_.report_health(
+        newest_utime_, health_t::OK,
+        std::format("OK: {:.1f} mm and {:.2f} mrad from the batch optimum at most; swapped {} times{}",
+                    1e3 * stats.shadow_gap_m, 1e3 * stats.shadow_gap_rad, stats.shadow_swaps, retirement_note(stats)));
   } else {
     link_.report_health(newest_utime_, health_t::OK, stats.keyframes > 0 ? "OK" : "OK: no keyframe yet");
   }

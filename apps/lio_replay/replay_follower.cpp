@@ -90,7 +90,8 @@ void ReplayFollower::publish(const SmootherUpdate& update) {
   correct_map(update);
   schedule_.note(update);
   if (!schedule_.begin_due()) return;
-  schedule_.begin(smoother_.stats().keyframes);
+  const SmootherStats stats = smoother_.stats();
+  schedule_.begin(stats.keyframes, stats.keyframes - stats.retired);
   problem_ = smoother_.shadow_problem();
 }
 

@@ -222,6 +222,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
       std::ranges::count_if(result.scans, [](const ScanStats& scan) { return scan.degenerate_directions > 0; });
   json["sessions"] = result.sessions;
   json["keyframes"] = result.smoother.keyframes;
+  json["keyframes_retired"] = result.smoother.retired;
   json["keyframes_without_imu"] = result.smoother.without_imu;
   json["keyframes_refused"] = result.keyframes_refused;
   json["map_refusals"] = result.map_refusals;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backend/graph_change.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <format>
+#include <utility>
 
 #include "common/byte_codec.h"
 #include "common/measurement_bytes.h"
@@ -44,14 +46,6 @@ void transfer(auto& io, FieldsOf<GraphNode> auto& node) {
   transfer(io, node.end);
   io.matrix(node.odometry);
   io.matrix(node.pose_covariance);
-}
-
-void transfer(auto& io, FieldsOf<PoseGraphEdge> auto& edge) {
-  io.number(edge.from);
-  io.number(edge.to);
-  transfer(io, edge.T_from_to);
-  io.matrix(edge.information);
-  io.number(edge.is_loop);
 }
 
 void transfer(auto& io, FieldsOf<RetiredBlock> auto& block) {
@@ -171,12 +165,36 @@ std::string reference_problem(const SmootherState& state, std::size_t known, con
       if (!are_known) return std::format("loop {}-{} names unknown keyframes", loop.result.from_id, loop.result.to_id);
     }
   }
-  for (const PoseGraphEdge& edge : change.retired.value_or(RetiredKeyframes()).loops) {
-    const bool are_known =
-        index_of(state.nodes, edge.from) < state.nodes.size() && index_of(state.nodes, edge.to) < state.nodes.size();
-    if (!are_known) return std::format("loop {}-{} names unknown keyframes", edge.to, edge.from);
-  }
   return {};
+}
+
+/// Why what has retired cannot be so, or nothing; the new nodes are among `state`'s. A loop between two keyframes that
+/// have retired is in neither list of loops.
+std::string retirement_problem(const SmootherState& state, const GraphChange& change) {
+  const std::size_t retired = change.retired ? change.retired->count() : state.retired.count();
+  const auto has_retired = [&](const GraphLoop& loop) {
+    return index_of(state.nodes, std::max(loop.result.from_id, loop.result.to_id)) < retired;
+  };
+  for (const auto& [list, change_of_list] :
+       {std::pair(&state.loops, &change.loops), std::pair(&state.waiting, &change.waiting)}) {
+    const auto stays = [&](const GraphLoop& loop) {
+      return has_retired(loop) && !std::ranges::contains(change_of_list->removed, loop.number);
+    };
+    if (std::ranges::any_of(*list, stays) || std::ranges::any_of(change_of_list->altered, has_retired) ||
+        std::ranges::any_of(change_of_list->appended, has_retired))
+      return "a loop between keyframes that have retired";
+  }
+  if (!change.retired) return {};
+  std::size_t until = state.retired.count();
+  for (const RetiredBlock& block : change.retired->blocks) {
+    if (block.until <= until || !block.covariance.allFinite()) return "a block of keyframes that have retired is none";
+    until = block.until;
+  }
+  if (!std::ranges::all_of(change.retired->loops, has_retired)) return "a loop has retired before its keyframes";
+  const Eigen::LLT<Eigen::Matrix<double, 9, 9>> root(change.retired->newest_motion.covariance);
+  const bool is_known = change.retired->newest_motion.mean.allFinite() &&
+                        change.retired->newest_motion.covariance.allFinite() && root.info() == Eigen::Success;
+  return is_known ? "" : "the motion of the newest keyframe that has retired is not known";
 }
 
 }  // namespace
@@ -186,11 +204,13 @@ std::vector<std::byte> encode_change(const GraphChange& change) { return to_byte
 std::optional<GraphChange> decode_change(std::span<const std::byte> bytes) { return from_bytes<GraphChange>(bytes); }
 
 std::string RestoredGraph::apply(GraphChange change) {
-  if (std::string problem = chain_problem(state, change); !problem.empty()) return problem;
+  if (std::string unlinked = chain_problem(state, change); !unlinked.empty()) return unlinked;
   if (!fits(change.loops, state.loops) || !fits(change.waiting, state.waiting)) return "a loop that changes is missing";
   const std::size_t known = state.nodes.size();
   std::ranges::move(change.state.nodes, std::back_inserter(state.nodes));
-  if (std::string problem = reference_problem(state, known, change); !problem.empty()) {
+  std::string problem = reference_problem(state, known, change);
+  if (problem.empty()) problem = retirement_problem(state, change);
+  if (!problem.empty()) {
     state.nodes.resize(known);
     return problem;
   }

@@ -20,25 +20,28 @@ using gtsam::symbol_shorthand::X;
 
 namespace {
 
-/// Or where it stays. Of the newest keyframe that has retired the pose is fixed and the rest is not.
+/// Of a keyframe that has retired: where it stays. Its velocity and biases nobody asks for any more, unless it is the
+/// newest of them, of which they are estimated.
 NavState linearised_at(std::int32_t id, const IncrementalSolver& solver) {
   const gtsam::Values& estimated = solver.linearisation_points();
-  const gtsam::Values& fixed = solver.fixed();
+  if (estimated.exists(X(id))) return estimate_of(estimated, id);
   gtsam::Values values;
-  for (const gtsam::Key key : {X(id), V(id), B(id)})
-    values.insert(key, (fixed.exists(key) ? fixed : estimated).at(key));
+  insert_estimate(id, {}, values);
+  values.update(X(id), solver.fixed().at(X(id)));
+  for (const gtsam::Key key : {V(id), B(id)}) {
+    if (estimated.exists(key)) values.update(key, estimated.at(key));
+  }
   return estimate_of(values, id);
 }
 
-/// Sorts what is fixed from what is estimated.
-void insert_point(const LinearisationPoint& point, std::size_t place, const RetiredKeyframes& retired,
-                  gtsam::Values& estimated, gtsam::Values& fixed) {
+/// Sorts what is fixed from what is estimated. `retired`: how many keyframes have.
+void insert_point(const LinearisationPoint& point, std::size_t place, std::size_t retired, gtsam::Values& estimated,
+                  gtsam::Values& fixed) {
   gtsam::Values all;
   insert_estimate(point.id, point.state, all);
-  for (const gtsam::Key key : all.keys()) {
-    const bool is_fixed = place + 1 < retired.count() || (place + 1 == retired.count() && key == X(point.id));
-    (is_fixed ? fixed : estimated).insert(key, all.at(key));
-  }
+  (place < retired ? fixed : estimated).insert(X(point.id), all.at(X(point.id)));
+  if (place + 1 < retired) return;
+  for (const gtsam::Key key : {V(point.id), B(point.id)}) estimated.insert(key, all.at(key));
 }
 
 }  // namespace
@@ -66,7 +69,7 @@ std::string restore_solver(RestoredGraph& graph, const BackendConfig& config, In
         make_relative_pose_factor(X(loop.result.to_id), X(loop.result.from_id), loop.result.T_to_from, loop.rows));
   }
   for (std::size_t i = 0; i < graph.linearised.size(); ++i)
-    insert_point(graph.linearised[i], i, state.retired, values, fixed);
+    insert_point(graph.linearised[i], i, state.retired.count(), values, fixed);
   solver.add_fixed(fixed);
   const SolverOutcome outcome = solver.add(factors, values);
   if (!outcome.accepted) return outcome.reason;

@@ -55,6 +55,12 @@ struct SolverOutcome {
   std::vector<FactorId> factors;  ///< of the batch, in its order
 };
 
+/// A prior that takes the place of factors.
+struct SolverSummary {
+  Eigen::MatrixXd covariance;  ///< joint, with all other variables of these factors in doubt
+  Eigen::VectorXd offset;      ///< of its mean from the solution, so that the solution stays where it is
+};
+
 /// iSAM2 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", IJRR 31(2), 2012) that
 /// survives its own exceptions. GTSAM's object is unusable after one, so factors and values are kept here as well; when
 /// a batch makes it throw, a fresh iSAM2 is built from everything but that batch. Deterministic; for one thread.
@@ -75,15 +81,16 @@ class IncrementalSolver {
   [[nodiscard]] SolverOutcome remove(std::span<const FactorId> factors);
 
   /// Ends the estimation of variables: from now on they are known to be where the solution has them, and their factors
-  /// say what they then say of the others. Later factors may name them. What is left to speak of the variables of
-  /// `instead` alone is taken out, for `instead` says all that. False when the graph cannot be solved then, and nothing
-  /// has changed. Costs as much as building iSAM2 anew.
-  [[nodiscard]] bool fix(std::span<const std::uint64_t> keys, const gtsam::NonlinearFactorGraph& instead);
+  /// say what they then say of the others. Later factors may name those of `known`, but not those of `forgotten`. What
+  /// is left to speak of the variables of `instead` alone is taken out, for `instead` says all that. False when the
+  /// graph cannot be solved then, and nothing has changed. Costs as much as building iSAM2 anew.
+  [[nodiscard]] bool fix(std::span<const std::uint64_t> known, std::span<const std::uint64_t> forgotten,
+                         const gtsam::NonlinearFactorGraph& instead);
 
   /// Variables that were fixed before, for a solver that begins anew.
   void add_fixed(const gtsam::Values& values);
 
-  /// What was fixed, and where.
+  /// What is known, and where.
   [[nodiscard]] const gtsam::Values& fixed() const;
 
   /// Further updates without news, after a large correction; fewer when nothing is left to linearise anew. False when
@@ -120,10 +127,10 @@ class IncrementalSolver {
   /// Covariance of one variable in its tangent space; nothing when it cannot be computed.
   [[nodiscard]] std::optional<Eigen::MatrixXd> marginal_covariance(std::uint64_t key) const;
 
-  /// Joint covariance of `wanted`, one below the other, by those factors alone that name none but `keys` and what is
-  /// fixed. Nothing where these leave something open.
-  [[nodiscard]] std::optional<Eigen::MatrixXd> covariance_among(std::span<const std::uint64_t> keys,
-                                                                std::span<const std::uint64_t> wanted);
+  /// What those factors alone that name none but `keys` and what is fixed say of `wanted`, one below the other. Nothing
+  /// where they leave something open.
+  [[nodiscard]] std::optional<SolverSummary> summary_of(std::span<const std::uint64_t> keys,
+                                                        std::span<const std::uint64_t> wanted);
 
   /// Two pose variables, of which one may be fixed.
   using KeyPair = std::pair<std::uint64_t, std::uint64_t>;

@@ -78,10 +78,11 @@ PoseGraph exported_graph(const SmootherState& state) {
     graph.edges.push_back(
         {state.nodes[i - 1].end.id, state.nodes[i].end.id, T_from_to, rows.transpose() * rows, false});
   }
-  graph.edges.insert(graph.edges.end(), state.retired.loops.begin(), state.retired.loops.end());
-  for (const GraphLoop& loop : state.loops) {
-    graph.edges.push_back(
-        {loop.result.to_id, loop.result.from_id, loop.result.T_to_from, loop.rows.transpose() * loop.rows, true});
+  for (const std::vector<GraphLoop>* loops : {&state.retired.loops, &state.loops}) {
+    for (const GraphLoop& loop : *loops) {
+      graph.edges.push_back(
+          {loop.result.to_id, loop.result.from_id, loop.result.T_to_from, loop.rows.transpose() * loop.rows, true});
+    }
   }
   return graph;
 }

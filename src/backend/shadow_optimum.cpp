@@ -57,8 +57,15 @@ void measure_gap(const ShadowProblem::Graph& graph, const gtsam::Values& optimum
   }
 }
 
+/// A variable of a keyframe that has retired.
+bool has_retired(gtsam::Key key, const SmootherState& state) {
+  const GraphNode* node = state.node_of(static_cast<std::int32_t>(gtsam::Symbol(key).index()));
+  return node != nullptr && state.place_of(node->end.id) < state.retired.count();
+}
+
 /// The optimum as a starting point for the graph as it is by now: keyframes that came later keep their motion relative
-/// to the newest one that was solved. Nothing when the optimum holds keyframes that this graph does not.
+/// to the newest one that was solved; those that have retired since stay. Nothing when the optimum holds keyframes that
+/// this graph does not.
 std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optimum, IncrementalSolver& solver,
                                             const SmootherState& state) {
   const gtsam::Values& solved = optimum.values;
@@ -81,6 +88,7 @@ std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optim
       values.update(key, gtsam::Vector3(T_new_old.rotation().matrix() * now.at<gtsam::Vector3>(key)));
     }
   }
+  for (const gtsam::Key key : solved.keys()) carried += !now.exists(key) && has_retired(key, state) ? 1 : 0;
   if (carried != solved.size()) return std::nullopt;
   return values;
 }

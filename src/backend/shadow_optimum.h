@@ -20,7 +20,7 @@ struct ShadowOptimum {
   std::shared_ptr<const Solution> solution;
   std::int32_t revision = 0;  ///< of the graph that was copied
   int keyframes = 0;
-  double largest_gap_m = 0.0;  ///< over all keyframes, between the copied estimate and the optimum
+  double largest_gap_m = 0.0;  ///< over all that are estimated, between the copied estimate and the optimum
   double largest_gap_rad = 0.0;
   double half_chi_square_before = 0.0;  ///< of the copied estimate
   double half_chi_square = 0.0;         ///< of the optimum

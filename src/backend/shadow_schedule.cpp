@@ -10,15 +10,15 @@ bool is_in_or_out(const LoopResult& loop) { return loop.accepted() || loop.reaso
 
 }  // namespace
 
-int shadow_delay(int keyframes) { return 1 + keyframes / 50; }
+int shadow_delay(int estimated) { return 1 + estimated / 50; }
 
 void ShadowSchedule::note(const SmootherUpdate& update) {
   loops_changed_ |= (update.loop && is_in_or_out(*update.loop)) || std::ranges::any_of(update.changed, is_in_or_out);
 }
 
-void ShadowSchedule::begin(int keyframes) {
+void ShadowSchedule::begin(int keyframes, int estimated) {
   loops_changed_ = false;
-  due_at_ = keyframes + shadow_delay(keyframes);
+  due_at_ = keyframes + shadow_delay(estimated);
 }
 
 }  // namespace ignis

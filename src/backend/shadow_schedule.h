@@ -17,8 +17,8 @@ class ShadowSchedule {
   /// A loop has entered or left since the last begin, and no solve is under way.
   [[nodiscard]] bool begin_due() const { return loops_changed_ && !pending(); }
 
-  /// The graph was copied with so many keyframes in it.
-  void begin(int keyframes);
+  /// The graph was copied with so many keyframes in it, of which so many are estimated.
+  void begin(int keyframes, int estimated);
 
   /// Between begin() and end().
   [[nodiscard]] bool pending() const { return due_at_ >= 0; }
@@ -34,7 +34,8 @@ class ShadowSchedule {
   int due_at_ = -1;  // keyframes in the graph
 };
 
-/// [keyframes] between copy and takeover: the more there are, the longer the solve, and none shall have to wait for it.
-[[nodiscard]] int shadow_delay(int keyframes);
+/// [keyframes] between copy and takeover: the more are estimated, the longer the solve, and none shall have to wait for
+/// it.
+[[nodiscard]] int shadow_delay(int estimated);
 
 }  // namespace ignis

@@ -156,7 +156,9 @@ SmootherUpdate Smoother::withdraw_loop(std::int32_t from_id, std::int32_t to_id)
 SmootherUpdate Smoother::veto_loop(std::int32_t from_id, std::int32_t to_id) {
   const LoopVeto veto{from_id, to_id};
   if (!std::ranges::contains(impl_->state.vetoes, veto)) impl_->state.vetoes.push_back(veto);
-  return withdraw_loop(from_id, to_id);
+  SmootherUpdate update = withdraw_loop(from_id, to_id);
+  if (update.loop) update.loop->reason_text = "vetoed from now on, but " + update.loop->reason_text;
+  return update;
 }
 
 ShadowProblem Smoother::shadow_problem() { return ignis::shadow_problem(impl_->solver, impl_->state); }

@@ -85,8 +85,8 @@ struct SmootherRestoration;
 /// odometry does. World +Y up.
 ///
 /// A loop enters when it agrees with odometry and belongs to the largest set of loops that agree with each other. It is
-/// on trial at first, then kept; whichever loop the evidence contradicts is taken out again, however old it is.
-/// Deterministic, no clock; one thread.
+/// on trial at first, then kept; whichever loop the evidence contradicts is taken out again, as long as one of its
+/// keyframes is estimated. Deterministic, no clock; one thread.
 class Smoother {
  public:
   /// `archive` keeps what take_change() gives; clouds beyond `cloud_memory_mb` are read back from it, and forgotten
@@ -114,7 +114,7 @@ class Smoother {
   /// keyframes that have retired stays, and `loop` says so.
   [[nodiscard]] SmootherUpdate withdraw_loop(std::int32_t from_id, std::int32_t to_id);
 
-  /// The same, and neither the pair nor its neighbours within loop_min_spacing are ever closed again.
+  /// The same, and neither the pair nor its neighbours within loop_min_spacing are closed again from now on.
   [[nodiscard]] SmootherUpdate veto_loop(std::int32_t from_id, std::int32_t to_id);
 
   /// The graph as it is now, for solve() on any thread.

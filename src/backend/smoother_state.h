@@ -13,7 +13,6 @@
 #include "backend/motion_factor.h"
 #include "backend/odometry_chain.h"
 #include "backend/place_index.h"
-#include "backend/pose_graph_file.h"
 #include "backend/smoother.h"
 
 namespace ignis {
@@ -53,7 +52,7 @@ struct RetiredBlock {
 struct RetiredKeyframes {
   std::vector<RetiredBlock> blocks;  ///< in the order of their keyframes
   Motion newest_motion;              ///< of the newest of them: velocity and biases are not taken for known
-  std::vector<PoseGraphEdge> loops;  ///< that were in the graph between them
+  std::vector<GraphLoop> loops;      ///< that were in the graph between them
 
   [[nodiscard]] std::size_t count() const { return blocks.empty() ? 0 : blocks.back().until; }
 };

@@ -193,7 +193,7 @@ TEST(IncrementalSolver, WhatIsFixedStaysAndTheRestIsThatOfAnExactPrior) {
     priors.addPrior(X(i), held.pose(i), gtsam::noiseModel::Isotropic::Sigma(6, 1e-6));
   }
   const Pose3 before = chain.pose(7);
-  ASSERT_TRUE(chain.solver.fix(known, {}));
+  ASSERT_TRUE(chain.solver.fix(known, {}, {}));
   ASSERT_TRUE(held.solver.add(priors, {}).accepted);
   EXPECT_EQ(chain.solver.estimate().size(), 12U);
   add_loop(chain, 18, 12, 0.1);
@@ -217,7 +217,7 @@ TEST(IncrementalSolver, WhatIsFixedStaysAndTheRestIsThatOfAnExactPrior) {
 TEST(IncrementalSolver, RefusesAFactorOnWhatIsFixedAlone) {
   SolverChain chain;
   chain.extend_to(6);
-  ASSERT_TRUE(chain.solver.fix(std::vector<gtsam::Key>{X(0), X(1), X(2)}, {}));
+  ASSERT_TRUE(chain.solver.fix(std::vector<gtsam::Key>{X(0), X(1), X(2)}, {}, {}));
   gtsam::NonlinearFactorGraph known;
   known.emplace_shared<gtsam::BetweenFactor<Pose3>>(X(0), X(2), step() * step(), kNoise);
   const SolverOutcome outcome = chain.solver.add(known, {});
@@ -235,7 +235,7 @@ TEST(IncrementalSolver, FixesNothingWhereTheRestCouldNotBeSolved) {
   WhiteningRows position_only = WhiteningRows::Zero(3, 6);
   position_only.rightCols<3>().setIdentity();
   instead.push_back(make_relative_pose_factor(X(2), X(3), Pose(), position_only));
-  EXPECT_FALSE(chain.solver.fix(std::vector<gtsam::Key>{X(0), X(1), X(2), X(4), X(5)}, instead));
+  EXPECT_FALSE(chain.solver.fix(std::vector<gtsam::Key>{X(0), X(1), X(2), X(4), X(5)}, {}, instead));
   EXPECT_EQ(chain.solver.estimate().size(), 6U);
   EXPECT_EQ(chain.solver.failure(), "");
   chain.extend_to(10);
@@ -243,7 +243,7 @@ TEST(IncrementalSolver, FixesNothingWhereTheRestCouldNotBeSolved) {
 }
 
 /// The past of a chain says of its end what the whole chain says before the future comes.
-TEST(IncrementalSolver, CovarianceAmongVariablesLeavesAllOthersOut) {
+TEST(IncrementalSolver, ASummaryLeavesOutWhatOtherVariablesSay) {
   SolverChain past;
   past.extend_to(6);
   SolverChain chain;
@@ -253,13 +253,48 @@ TEST(IncrementalSolver, CovarianceAmongVariablesLeavesAllOthersOut) {
   ASSERT_TRUE(chain.solver.add(future, {}).accepted);
   std::vector<gtsam::Key> keys;
   for (int i = 0; i < 6; ++i) keys.push_back(X(i));
-  const auto among = chain.solver.covariance_among(keys, std::vector<gtsam::Key>{X(5), X(4)});
-  ASSERT_TRUE(among);
-  ASSERT_EQ(among->rows(), 12);
-  EXPECT_TRUE((among->topLeftCorner<6, 6>().isApprox(past.solver.marginal_covariance(X(5)).value(), 1e-6)));
-  EXPECT_TRUE((among->bottomRightCorner<6, 6>().isApprox(past.solver.marginal_covariance(X(4)).value(), 1e-6)));
-  EXPECT_FALSE(chain.solver.covariance_among(std::vector<gtsam::Key>{X(4), X(5)}, std::vector<gtsam::Key>{X(5)}))
+  const auto summary = chain.solver.summary_of(keys, std::vector<gtsam::Key>{X(5), X(4)});
+  ASSERT_TRUE(summary);
+  ASSERT_EQ(summary->covariance.rows(), 12);
+  EXPECT_TRUE(
+      (summary->covariance.topLeftCorner<6, 6>().isApprox(past.solver.marginal_covariance(X(5)).value(), 1e-6)));
+  EXPECT_TRUE(
+      (summary->covariance.bottomRightCorner<6, 6>().isApprox(past.solver.marginal_covariance(X(4)).value(), 1e-6)));
+  EXPECT_FALSE(chain.solver.summary_of(std::vector<gtsam::Key>{X(4), X(5)}, std::vector<gtsam::Key>{X(5)}))
       << "without the prior nothing holds them";
+  EXPECT_FALSE(chain.solver.summary_of(std::vector<gtsam::Key>{X(0), X(11)}, std::vector<gtsam::Key>{X(11)}))
+      << "no factor of these names it";
+}
+
+/// A prior that a summary makes takes the place of its factors, and the solution stays although the future pulls.
+TEST(IncrementalSolver, ASummaryInsteadOfTheFactorsLeavesTheSolutionWhereItIs) {
+  SolverChain chain;
+  chain.solver = IncrementalSolver({.relinearize_position_m = 1e-6, .relinearize_rotation_rad = 1e-6});
+  chain.extend_to(12);
+  gtsam::NonlinearFactorGraph future;
+  future.addPrior(X(11), chain.pose(11) * Pose3(gtsam::Rot3(), {0.3, 0.2, 0.1}), kNoise);
+  ASSERT_TRUE(chain.solver.add(future, {}).accepted);
+  chain.solver.settle(20);
+  std::vector<gtsam::Key> keys;
+  for (int i = 0; i < 6; ++i) keys.push_back(X(i));
+  const std::vector<gtsam::Key> wanted{X(5)};
+  const auto summary = chain.solver.summary_of(keys, wanted);
+  ASSERT_TRUE(summary);
+  EXPECT_GT(summary->offset.norm(), 1e-3) << "else the future pulls at nothing";
+  std::vector<Pose3> before;
+  for (int i = 5; i < 12; ++i) before.push_back(chain.pose(i));
+  gtsam::NonlinearFactorGraph instead;
+  instead.addPrior(X(5), Pose3(chain.pose(5).retract(summary->offset)),
+                   gtsam::noiseModel::Gaussian::Covariance(summary->covariance));
+  const Eigen::MatrixXd covariance = chain.solver.marginal_covariance(X(11)).value();
+  keys.pop_back();
+  ASSERT_TRUE(chain.solver.fix({}, keys, instead));
+  chain.solver.settle(20);
+  EXPECT_EQ(chain.solver.estimate().size(), 7U);
+  for (int i = 5; i < 12; ++i) {
+    EXPECT_LT(before[static_cast<std::size_t>(i - 5)].localCoordinates(chain.pose(i)).norm(), 2e-4) << i;
+  }
+  EXPECT_TRUE(chain.solver.marginal_covariance(X(11))->isApprox(covariance, 1e-2));
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(ShadowSchedule, DoesNotBeginForWhatChangesNoFactor) {
 TEST(ShadowSchedule, IsDueACountOfKeyframesLater) {
   ShadowSchedule schedule;
   EXPECT_FALSE(schedule.adoption_due(1'000'000)) << "nothing has begun";
-  schedule.begin(20);
+  schedule.begin(20, 20);
   EXPECT_TRUE(schedule.pending());
   EXPECT_FALSE(schedule.adoption_due(20));
   EXPECT_TRUE(schedule.adoption_due(20 + shadow_delay(20)));
@@ -66,13 +66,13 @@ TEST(ShadowSchedule, GivesALargerGraphMoreKeyframes) {
 TEST(ShadowSchedule, RemembersALoopThatCameMeanwhile) {
   ShadowSchedule schedule;
   schedule.note(with_loop(LoopReason::kAccepted));
-  schedule.begin(20);
+  schedule.begin(20, 20);
   EXPECT_FALSE(schedule.begin_due());
   schedule.note(with_loop(LoopReason::kAccepted));
   EXPECT_FALSE(schedule.begin_due()) << "one at a time";
   schedule.end();
   EXPECT_TRUE(schedule.begin_due());
-  schedule.begin(21);
+  schedule.begin(21, 21);
   schedule.end();
   EXPECT_FALSE(schedule.begin_due());
 }
