@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <limits>
 #include <random>
 #include <tuple>
 
@@ -133,6 +134,8 @@ TEST_P(SmootherJournal, KilledAnywhereEndsWithTheSameGraph) {
   EXPECT_GE(uninterrupted.stats().loops_kept, 3);
   EXPECT_EQ(uninterrupted.stats().retired > 0, estimated_keyframes < 60);
   expect_same(uninterrupted, killed);
+  const Matrix6d covariance = uninterrupted.withdraw_loop(-1, -1).covariance;
+  EXPECT_TRUE(killed.withdraw_loop(-1, -1).covariance.isApprox(covariance, 1e-3));
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SmootherJournal,
@@ -177,6 +180,65 @@ TEST(SmootherJournalRecords, TheFirstThatDoesNotFitEndsItAndIsNamed) {
   cut[2].pop_back();
   EXPECT_EQ(restored(cut).records_used, 2U);
   EXPECT_TRUE(testing::contains(restored(cut).problem, "no change of a graph"));
+}
+
+/// Records of laps until keyframes have retired for the second time.
+Records records_of_laps(const BackendConfig& config) {
+  const testing::Drive drive = testing::make_drive({.seed = 3, .keyframes = 46});
+  Smoother smoother(config, LoopGates());
+  std::mt19937 random(3);
+  Records records;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    static_cast<void>(smoother.add_keyframe(keyframe));
+    if (keyframe.id >= 21) static_cast<void>(smoother.add_loop(random_loop(drive, keyframe.id, true, random)));
+    records.push_back(smoother.take_change());
+    if (decode_change(records.back())->retired && keyframe.id > 42) return records;
+  }
+  return {};
+}
+
+TEST(SmootherJournalRecords, ARetirementThatCannotBeIsRefusedAndNamed) {
+  BackendConfig config = trusting(40);
+  config.use_loop_closing = false;
+  const Records sound = records_of_laps(config);
+  ASSERT_FALSE(sound.empty());
+  EXPECT_EQ(restored(sound, config).problem, "");
+  const auto problem = [&](const auto& spoil) {
+    Records records = sound;
+    GraphChange change = decode_change(sound.back()).value();
+    spoil(change);
+    records.back() = encode_change(change);
+    const SmootherRestoration restoration = restored(records, config);
+    EXPECT_EQ(restoration.records_used, sound.size() - 1);
+    EXPECT_GT(restoration.smoother.stats().keyframes, 40);
+    return restoration.problem;
+  };
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(testing::contains(problem([](GraphChange& change) { change.retired->blocks.back().until = 4000; }),
+                                "keyframes have retired"));
+  EXPECT_TRUE(testing::contains(problem([](GraphChange& change) { change.retired->blocks.clear(); }),
+                                "keyframes have retired"));
+  EXPECT_TRUE(testing::contains(
+      problem([&](GraphChange& change) { change.retired->blocks.back().covariance(0, 0) = none; }), "is none"));
+  EXPECT_TRUE(testing::contains(
+      problem([&](GraphChange& change) { change.retired->newest_motion.covariance(2, 2) = none; }), "is not known"));
+  EXPECT_TRUE(testing::contains(
+      problem([](GraphChange& change) { change.retired->newest_motion.covariance(2, 2) = -1.0; }), "is not known"));
+  EXPECT_TRUE(testing::contains(problem([](GraphChange& change) {
+                                  GraphLoop young;
+                                  young.result.from_id = 42;
+                                  change.retired->loops.push_back(young);
+                                }),
+                                "before its keyframes"));
+  EXPECT_TRUE(testing::contains(problem([](GraphChange& change) {
+                                  GraphLoop old;
+                                  old.result.from_id = 3;
+                                  old.result.to_id = 1;
+                                  change.waiting.appended.push_back(old);
+                                }),
+                                "between keyframes that have retired"));
+  EXPECT_TRUE(
+      testing::contains(problem([](GraphChange& change) { change.state.links.clear(); }), "links of keyframes"));
 }
 
 TEST(SmootherJournalRecords, HoldWhatTheFrontEndKnowsOfItsDrift) {
