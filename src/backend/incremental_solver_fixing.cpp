@@ -56,10 +56,11 @@ std::optional<SolverSummary> IncrementalSolver::summary_of(std::span<const std::
     summary.covariance = part.covariance(one_below_the_other(wanted, values));
     summary.offset = -summary.covariance * slope_of_wanted;
     if (summary.covariance.allFinite() && summary.offset.allFinite()) return summary;
+    return std::nullopt;
   } catch (const std::exception&) {
     // They do not determine themselves.
+    return std::nullopt;
   }
-  return std::nullopt;
 }
 
 bool IncrementalSolver::fix(std::span<const std::uint64_t> known, std::span<const std::uint64_t> forgotten,
