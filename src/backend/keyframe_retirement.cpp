@@ -22,9 +22,8 @@ using gtsam::symbol_shorthand::B;
 using gtsam::symbol_shorthand::V;
 using gtsam::symbol_shorthand::X;
 
-constexpr std::size_t kShareThatRetires = 8;
-
-constexpr std::size_t kTrials = 2;  // more keyframes than this many trials of a loop take are estimated
+constexpr std::size_t kShareThatRetires = 8;  // of what may be estimated: one in so many
+constexpr std::size_t kTrials = 2;            // as many keyframes as a loop's trials take are estimated in any case
 // [m] What has retired is taken for exact, as a known place, and a loop's own sigma is centimetres.
 constexpr double kKnownWithin = 0.1;
 

@@ -58,7 +58,8 @@ struct RetiredKeyframes {
 };
 
 /// All that the smoother knows besides the solver's factors and values. Plain data; the functions that change it stand
-/// in keyframe_chain.h, loop_*.h and revision_report.h. The vectors of one element per node share their indices.
+/// in keyframe_chain.h, keyframe_retirement.h, loop_*.h and revision_report.h. The vectors of one element per node
+/// share their indices.
 struct SmootherState {
   std::vector<GraphNode> nodes;
   RetiredKeyframes retired;         ///< the oldest of them
