@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kMostlyShift = 0.7;  // of a unit vector: beyond, it is more shift than turn
 // Signal that a turn takes from a shift, as a share of what errors of the normals explain. Chance makes some 1 / points
-// of it. Straight walls: at most 0.06; bends of 25 m radius: from 0.29, of 12 m 1.2, of 6 m 4.8 (docs/front_end.md).
+// of it. Straight walls: at most 0.06; bends of 25 m radius: from 0.29, of 12 m 1.2, of 6 m 4.8
+// (docs/front_end_results.md).
 constexpr double kOwnTurn = 0.1;
 
 /// Adds a direction to an orthonormal list.
