@@ -185,8 +185,7 @@ class Drive {
     map_.correct(update.T_map_odom, poses, update.revision);
     schedule_.note(update);
     if (!schedule_.begin_due()) return;
-    const SmootherStats stats = graph_.smoother().stats();
-    schedule_.begin(stats.keyframes, stats.keyframes - stats.retired);
+    schedule_.begin(graph_.smoother().stats());
     problem_ = graph_.shadow_problem();
   }
 

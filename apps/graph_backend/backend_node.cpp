@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "backend/keyframe_check.h"
+#include "backend_health.h"
 #include "command_check.h"
 #include "ignis/graph_command_t.hpp"
 #include "messages/graph_revision.h"
@@ -40,11 +41,6 @@ SmootherUpdate answered(SmootherUpdate update, const graph_command_t& command) {
                                                                                  : "there is no such loop to withdraw");
   update.loop->utime = update.newest.utime;
   return update;
-}
-
-std::string retirement_note(const SmootherStats& stats) {
-  if (stats.retired == 0) return "";
-  return std::format("; the oldest {} of {} keyframes have retired", stats.retired, stats.keyframes);
 }
 
 }  // namespace
@@ -155,8 +151,7 @@ void BackendNode::adopt_due_optimum() {
 /// optimum.
 void BackendNode::begin_due_optimum() {
   if (!schedule_.begin_due()) return;
-  const SmootherStats stats = graph_.smoother().stats();
-  schedule_.begin(stats.keyframes, stats.keyframes - stats.retired);
+  schedule_.begin(graph_.smoother().stats());
   optimum_.begin(graph_.shadow_problem());
 }
 
@@ -241,41 +236,17 @@ void BackendNode::give_up_before(std::int32_t id) {
 
 void BackendNode::publish_health() {
   keyframe_counts_->queue_drops = assembler_.incomplete() + inbox_.dropped() + keyframes_given_up_;
-  const SmootherStats stats = graph_.smoother().stats();
-  const bool cloud_was_lost = cloud_losses_.look(stats.clouds_unreadable, std::chrono::steady_clock::now());
-  const bool keyframe_was_lost = keyframe_losses_.look(keyframes_given_up_, std::chrono::steady_clock::now());
-  if (!stats.solver_failure.empty()) {
-    link_.report_health(
-        newest_utime_, health_t::FAULT,
-        std::format("the graph takes no more keyframes: {}; a restart or a new session begins a new graph",
-                    stats.solver_failure));
-  } else if (!refusal_.empty()) {
-    link_.report_health(newest_utime_, health_t::DEGRADED, refusal_);
-  } else if (const std::string failure = graph_.failure(); !failure.empty()) {
-    link_.report_health(newest_utime_, health_t::DEGRADED, failure);
-  } else if (!inbox_.empty()) {
-    link_.report_health(newest_utime_, health_t::DEGRADED,
-                        std::format("waiting for keyframe {}", graph_.smoother().expected_id()));
-  } else if (keyframe_was_lost) {
-    link_.report_health(newest_utime_, health_t::DEGRADED,
-                        std::format("{} keyframes are given up; the graph has holes there", keyframes_given_up_));
-  } else if (stats.clouds_unreadable > 0) {
-    link_.report_health(newest_utime_, cloud_was_lost ? health_t::DEGRADED : health_t::OK,
-                        std::format("{}{} times the journal did not give a cloud back, and a loop was refused for it",
-                                    cloud_was_lost ? "" : "OK: ", stats.clouds_unreadable));
-  } else if (stats.clouds_forgotten > 0) {
-    link_.report_health(newest_utime_, health_t::OK,
-                        std::format("OK: without a journal {} clouds beyond backend.cloud_memory_mb were dropped; "
-                                    "no loop ends there",
-                                    stats.clouds_forgotten));
-  } else if (stats.shadow_checks > 0) {
-    link_.report_health(
-        newest_utime_, health_t::OK,
-        std::format("OK: {:.1f} mm and {:.2f} mrad from the batch optimum at most; swapped {} times{}",
-                    1e3 * stats.shadow_gap_m, 1e3 * stats.shadow_gap_rad, stats.shadow_swaps, retirement_note(stats)));
-  } else {
-    link_.report_health(newest_utime_, health_t::OK, stats.keyframes > 0 ? "OK" : "OK: no keyframe yet");
-  }
+  const auto now = std::chrono::steady_clock::now();
+  BackendSituation situation;
+  situation.graph = graph_.smoother().stats();
+  situation.refusal = refusal_;
+  situation.journal_failure = graph_.failure();
+  if (!inbox_.empty()) situation.waiting_for = graph_.smoother().expected_id();
+  situation.keyframes_given_up = keyframes_given_up_;
+  situation.gave_up_lately = keyframe_losses_.look(keyframes_given_up_, now);
+  situation.missed_a_cloud_lately = cloud_losses_.look(situation.graph.clouds_unreadable, now);
+  const BackendHealth health = health_of(situation);
+  link_.report_health(newest_utime_, health.state, health.text);
 }
 
 }  // namespace ignis

@@ -90,8 +90,7 @@ void ReplayFollower::publish(const SmootherUpdate& update) {
   correct_map(update);
   schedule_.note(update);
   if (!schedule_.begin_due()) return;
-  const SmootherStats stats = smoother_.stats();
-  schedule_.begin(stats.keyframes, stats.keyframes - stats.retired);
+  schedule_.begin(smoother_.stats());
   problem_ = smoother_.shadow_problem();
 }
 

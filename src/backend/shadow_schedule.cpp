@@ -16,9 +16,9 @@ void ShadowSchedule::note(const SmootherUpdate& update) {
   loops_changed_ |= (update.loop && is_in_or_out(*update.loop)) || std::ranges::any_of(update.changed, is_in_or_out);
 }
 
-void ShadowSchedule::begin(int keyframes, int estimated) {
+void ShadowSchedule::begin(const SmootherStats& graph) {
   loops_changed_ = false;
-  due_at_ = keyframes + shadow_delay(estimated);
+  due_at_ = graph.keyframes + shadow_delay(graph.keyframes - graph.retired);
 }
 
 }  // namespace ignis

@@ -17,8 +17,8 @@ class ShadowSchedule {
   /// A loop has entered or left since the last begin, and no solve is under way.
   [[nodiscard]] bool begin_due() const { return loops_changed_ && !pending(); }
 
-  /// The graph was copied with so many keyframes in it, of which so many are estimated.
-  void begin(int keyframes, int estimated);
+  /// The graph was copied as it is now.
+  void begin(const SmootherStats& graph);
 
   /// Between begin() and end().
   [[nodiscard]] bool pending() const { return due_at_ >= 0; }

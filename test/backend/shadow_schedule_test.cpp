@@ -24,6 +24,13 @@ SmootherUpdate with_change(LoopReason reason) {
   return update;
 }
 
+SmootherStats graph_of(int keyframes, int retired = 0) {
+  SmootherStats graph;
+  graph.keyframes = keyframes;
+  graph.retired = retired;
+  return graph;
+}
+
 TEST(ShadowSchedule, BeginsWhenALoopEntersOrLeaves) {
   for (const SmootherUpdate& update :
        {with_loop(LoopReason::kAccepted), with_change(LoopReason::kAccepted), with_change(LoopReason::kWithdrawn)}) {
@@ -48,13 +55,20 @@ TEST(ShadowSchedule, DoesNotBeginForWhatChangesNoFactor) {
 TEST(ShadowSchedule, IsDueACountOfKeyframesLater) {
   ShadowSchedule schedule;
   EXPECT_FALSE(schedule.adoption_due(1'000'000)) << "nothing has begun";
-  schedule.begin(20, 20);
+  schedule.begin(graph_of(20));
   EXPECT_TRUE(schedule.pending());
   EXPECT_FALSE(schedule.adoption_due(20));
   EXPECT_TRUE(schedule.adoption_due(20 + shadow_delay(20)));
   EXPECT_TRUE(schedule.adoption_due(21 + shadow_delay(20)));
   schedule.end();
   EXPECT_FALSE(schedule.adoption_due(100));
+}
+
+TEST(ShadowSchedule, DoesNotWaitForKeyframesThatHaveRetired) {
+  ShadowSchedule schedule;
+  schedule.begin(graph_of(4'000, 3'000));
+  EXPECT_FALSE(schedule.adoption_due(3'999 + shadow_delay(1'000)));
+  EXPECT_TRUE(schedule.adoption_due(4'000 + shadow_delay(1'000)));
 }
 
 TEST(ShadowSchedule, GivesALargerGraphMoreKeyframes) {
@@ -66,13 +80,13 @@ TEST(ShadowSchedule, GivesALargerGraphMoreKeyframes) {
 TEST(ShadowSchedule, RemembersALoopThatCameMeanwhile) {
   ShadowSchedule schedule;
   schedule.note(with_loop(LoopReason::kAccepted));
-  schedule.begin(20, 20);
+  schedule.begin(graph_of(20));
   EXPECT_FALSE(schedule.begin_due());
   schedule.note(with_loop(LoopReason::kAccepted));
   EXPECT_FALSE(schedule.begin_due()) << "one at a time";
   schedule.end();
   EXPECT_TRUE(schedule.begin_due());
-  schedule.begin(21, 21);
+  schedule.begin(graph_of(21));
   schedule.end();
   EXPECT_FALSE(schedule.begin_due());
 }
