@@ -9,8 +9,9 @@
 
 /// Which verified loops may be in the graph. A loop must agree with the odometry between its ends and belong to the
 /// largest set of loops that agree with each other; where odometry leaves much open, another member of that set must
-/// pin it down. What the graph contradicts waits for others to stand with. What enters is on trial, and kept after some
-/// keyframes without contradiction, if odometry or the graph without its neighbours that say the same is sure of it.
+/// pin it down. What the graph contradicts waits, and is judged again beside the loops that come later. What enters is
+/// on trial, and kept after some keyframes without contradiction, if odometry or the graph without its neighbours that
+/// say the same is sure of it.
 namespace ignis {
 
 /// Changes of loops' stages in their order, each as it is to be published.

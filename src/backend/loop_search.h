@@ -22,8 +22,8 @@ struct LoopProposal {
 [[nodiscard]] bool is_vetoed(std::span<const LoopVeto> vetoes, std::int32_t from_id, std::int32_t to_id, int spacing);
 
 /// Looks for a loop that ends at the newest keyframe, unless one was closed only just. Up to loop_max_candidates are
-/// matched; the verified one with the largest matched fraction wins, the older one on a tie. Requires follow_nodes().
-/// A candidate whose surroundings are lost (CloudStore) is refused.
+/// matched, and the first one that is verified wins. If none is, the one with the largest matched fraction tells why,
+/// the older one on a tie. Requires follow_nodes(). A candidate whose surroundings are lost (CloudStore) is refused.
 [[nodiscard]] LoopProposal search_loop(SmootherState& state, const BackendConfig& config, const LoopGates& gates);
 
 }  // namespace ignis

@@ -34,6 +34,25 @@ void list_moved(SmootherState& state, SmootherUpdate& update) {
   }
 }
 
+void describe_newest(IncrementalSolver& solver, const SmootherState& state, SmootherUpdate& update) {
+  update.revision = state.revision;
+  update.expected_id = state.expected_id;
+  update.T_map_odom = T_map_odom(state);
+  if (state.nodes.empty()) return;
+  const LinkEnd& end = state.nodes.back().end;
+  update.newest = estimate_of(solver, end.id);
+  update.newest.utime = end.filter.utime;
+  update.newest.angular_rate = state.angular_rate;
+}
+
+void add_covariance(IncrementalSolver& solver, const SmootherState& state, SmootherUpdate& update) {
+  if (state.nodes.empty()) return;
+  if (const auto covariance = solver.marginal_covariance(X(state.nodes.back().end.id))) {
+    update.covariance = with_axis_doubt(since_start(*covariance, state));
+    update.covariance_valid = true;
+  }
+}
+
 }  // namespace
 
 void refresh_poses(IncrementalSolver& solver, SmootherState& state) {
@@ -53,20 +72,18 @@ Pose T_map_odom(const SmootherState& state) {
 }
 
 void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUpdate& update) {
-  update.revision = state.revision;
-  update.expected_id = state.expected_id;
-  update.T_map_odom = T_map_odom(state);
-  if (state.nodes.empty()) return;
-  const LinkEnd& end = state.nodes.back().end;
-  update.newest = estimate_of(solver, end.id);
-  update.newest.utime = end.filter.utime;
-  update.newest.angular_rate = state.angular_rate;
+  describe_newest(solver, state, update);
   if (!update.accepted()) return;
-  if (const auto covariance = solver.marginal_covariance(X(end.id))) {
-    update.covariance = with_axis_doubt(since_start(*covariance, state));
-    update.covariance_valid = true;
-  }
+  add_covariance(solver, state, update);
   list_moved(state, update);
+}
+
+SmootherUpdate present_revision(IncrementalSolver& solver, const SmootherState& state) {
+  SmootherUpdate update;
+  update.verdict = KeyframeVerdict::kAccepted;
+  describe_newest(solver, state, update);
+  add_covariance(solver, state, update);
+  return update;
 }
 
 PoseGraph exported_graph(const SmootherState& state) {

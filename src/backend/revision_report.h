@@ -16,6 +16,9 @@ void refresh_poses(IncrementalSolver& solver, SmootherState& state);
 /// Fills revision, newest state and covariance of `update`, and lists what moved since it was last listed.
 void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUpdate& update);
 
+/// The same as it stands, without poses.
+[[nodiscard]] SmootherUpdate present_revision(IncrementalSolver& solver, const SmootherState& state);
+
 /// Poses, odometry and loops for keyframes.g2o.
 [[nodiscard]] PoseGraph exported_graph(const SmootherState& state);
 

@@ -9,14 +9,14 @@ namespace ignis {
 namespace {
 
 // Chosen for the NEES of the smoothed pose in corridor, open hall, hall and rooms (docs/back_end_results.md).
-constexpr double kWeak = 0.3;       // information relative to the best, of which about half counts
-constexpr double kWeakShare = 0.1;  // of the weakest that counts
+constexpr double kWeak = 0.3;       // information relative to the best, of which two thirds count
+constexpr double kWeakShare = 0.1;  // of the weakest that counts, before the best is brought to 1
 
 double best(const Eigen::Matrix3d& information) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(information, Eigen::EigenvaluesOnly).eigenvalues()(2);
 }
 
-/// 1 from the best known direction on, kWeakShare far below kWeak.
+/// 1 from the best known direction on, an eighth far below kWeak.
 double share(double relative) {
   const auto curve = [](double value) { return (value + kWeakShare * kWeak) / (value + kWeak); };
   return std::min(1.0, curve(relative) / curve(1.0));

@@ -174,6 +174,8 @@ SmootherUpdate Smoother::adopt(const ShadowOptimum& optimum) {
   return update;
 }
 
+SmootherUpdate Smoother::present() const { return present_revision(impl_->solver, impl_->state); }
+
 void Smoother::accept_gap_before(std::int32_t id) { impl_->state.expected_id = std::max(impl_->state.expected_id, id); }
 
 const std::vector<KeyframePose>& Smoother::all_poses() const { return impl_->state.poses; }

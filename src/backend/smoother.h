@@ -124,6 +124,9 @@ class Smoother {
   /// configured. Keyframes and loops may have come since; an optimum of another graph is ignored.
   [[nodiscard]] SmootherUpdate adopt(const ShadowOptimum& optimum);
 
+  /// The newest update once more, as after a restart, without what it moved.
+  [[nodiscard]] SmootherUpdate present() const;
+
   /// All keyframes as the graph places them, ascending ids.
   [[nodiscard]] const std::vector<KeyframePose>& all_poses() const;
   [[nodiscard]] Pose T_map_odom() const;

@@ -10,10 +10,10 @@ import zlib
 from pathlib import Path
 
 import pytest
-from ignis_lcm.ignis import graph_command_t
+from ignis_lcm.ignis import graph_command_t, smoothed_keyframes_t
 
 from ignis import graph
-from ignis.bus import Listener
+from ignis.bus import Listener, open_bus
 from ignis.pipeline import Pipeline
 from keyframe_source import BUS, BackendRun, record_keyframes
 
@@ -49,6 +49,22 @@ def test_journal_of_another_configuration_is_kept_but_not_used(keyframes: list[l
     said = first_words(tmp_path, tmp_path / "other.json", "another configuration", f"{JOURNAL}.old1")
     assert "resumed" not in said
     assert (tmp_path / "journal" / f"{JOURNAL}.old1").stat().st_size > 100_000
+
+
+def test_a_restarted_back_end_tells_how_sure_the_newest_pose_is(keyframes: list[list[bytes]], tmp_path: Path) -> None:
+    BackendRun(tmp_path, CONFIG, keyframes, 0.0, 1).drive(INTERVAL)
+    sets: list[smoothed_keyframes_t] = []
+    with Pipeline(tmp_path, BUS) as pipeline:
+        bus = open_bus(BUS)
+        bus.subscribe("SMOOTHED_KEYFRAMES", lambda _, data: sets.append(smoothed_keyframes_t.decode(data)))
+        pipeline.start("graph_backend", "--config", CONFIG, "--journal", tmp_path / "journal")
+        end = time.monotonic() + START_S
+        while not sets:
+            assert time.monotonic() < end
+            bus.handle_timeout(100)
+    assert sets[0].full
+    variances = sets[0].map_odom_covariance[:: 6 + 1]
+    assert all(0.0 < variance < 0.01 for variance in variances), variances
 
 
 def test_journal_of_another_version_is_named_and_kept(private_network, tmp_path: Path) -> None:
