@@ -2,7 +2,7 @@
 //
 // graph_drive: the back end alone over recorded keyframes (keyframe_log, or any log of a live run that holds
 // LIO_KEYFRAME), with the processor time of each. Prints one JSON object; with --out also trajectories, loops and
-// graph. Like the processes, it begins anew with each session: what it writes is of the newest.
+// graph, and as distributed.tum what the reference would have made of the same loops. Like the processes, it begins anew with each session: what it writes is of the newest.
 //
 //     build/release/bin/graph_drive KEYFRAMES.lcm --config config/ignis8_tuned.json --set backend.SECTION.KEY=VALUE
 
@@ -17,6 +17,7 @@
 
 #include "backend/smoother.h"
 #include "common/trajectory_file.h"
+#include "distributed_chain.h"
 #include "keyframe_file.h"
 #include "odometry_source.h"
 #include "process_cost.h"
@@ -37,7 +38,9 @@ struct NewestPose {
 /// The back end over one session's keyframes.
 class Drive {
  public:
-  explicit Drive(const runtime::IgnisConfig& config) : smoother_(config.backend, config.frontend.loop_gates) {}
+  explicit Drive(const runtime::IgnisConfig& config)
+      : smoother_(config.backend, config.frontend.loop_gates),
+        distributed_(config.frontend.loop_gates.loop_max_correction_m) {}
 
   void add(const Keyframe& keyframe) {
     const double began = processor_ms();
@@ -48,6 +51,7 @@ class Drive {
     if (!update.accepted()) return;
     stamps_.push_back(keyframe.state.utime);
     newest_.push_back({update.newest.T_odom_body, update.covariance});
+    distributed_.add(keyframe.id, keyframe.state.T_odom_body);
     if (update.loop) note(*update.loop);
     for (const LoopResult& changed : update.changed) note(changed);
   }
@@ -75,9 +79,13 @@ class Drive {
     std::filesystem::create_directories(folder);
     write_tum(folder / "eskf.tum", odometry_);
     Trajectory smoothed;
-    for (std::size_t i = 0; i < stamps_.size(); ++i)
+    Trajectory distributed;
+    for (std::size_t i = 0; i < stamps_.size(); ++i) {
       smoothed.push_back({stamps_[i], smoother_.all_poses()[i].T_map_body});
+      distributed.push_back({stamps_[i], distributed_.poses()[i]});
+    }
     write_tum(folder / "smoothed.tum", smoothed);
+    write_tum(folder / "distributed.tum", distributed);
     write_pose_graph(folder / "keyframes.g2o", smoother_.pose_graph());
     write_newest(folder / "newest.csv");
     std::ofstream loops(folder / "loops.csv");
@@ -90,6 +98,7 @@ class Drive {
 
  private:
   void note(const LoopResult& loop) {
+    if (loop.reason == LoopReason::kAccepted) distributed_.close(loop);
     loop_lines_.push_back(std::format("{},{},{},{},{},{},{},{:.4f},{:.4f},{:.3f},{:.3f},\"{}\"", loop.utime,
                                       loop.from_id, loop.to_id, static_cast<int>(loop.stage), text(loop.reason),
                                       loop.candidates, loop.passed, loop.correction_m, loop.mean_residual,
@@ -115,6 +124,7 @@ class Drive {
 
   double bytes_before_ = bench::resident_bytes();
   Smoother smoother_;
+  bench::DistributedChain distributed_;
   double journal_bytes_ = 0.0;
   std::vector<double> times_ms_;
   Trajectory odometry_;
