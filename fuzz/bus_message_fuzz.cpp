@@ -77,8 +77,8 @@ void check_nth(std::size_t chosen, bool make_good, std::span<const std::byte> by
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Receivers receivers;
   if (size == 0) return 0;
-  check_nth<cloud_t, driver_status_t, graph_command_t, health_t, imu_t, keyframe_request_t, keyframe_t, loop_result_t,
-            map_status_t, pose_t, scan_stats_t, scan_t, smoothed_keyframes_t, state_t>(
+  check_nth<cloud_t, driver_status_t, graph_command_t, health_t, imu_t, keyframe_request_t, keyframe_t, lio_command_t,
+            loop_result_t, map_status_t, pose_t, scan_stats_t, scan_t, smoothed_keyframes_t, state_t>(
       data[0] >> 1, (data[0] & 1) != 0, std::as_bytes(std::span(data + 1, size - 1)), receivers);
   return 0;
 }

@@ -51,6 +51,9 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
   cloud_request_counts_ = &link_.subscribe<keyframe_request_t>(
       channels::kCloudRequest, kRequestQueue, [this](const keyframe_request_t& request) { on_cloud_request(request); },
       runtime::Senders::kSeveral);
+  link_.subscribe<lio_command_t>(
+      channels::kLioCommand, kRequestQueue, [this](const lio_command_t& command) { return on_command(command); },
+      runtime::Senders::kSeveral);
 }
 
 void FrontendNode::resume() {
@@ -181,6 +184,11 @@ void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
     parts += sent->parts.size() + *keyframe_parts;
     if (parts >= kMostResentParts) return;
   }
+}
+
+const char* FrontendNode::on_command(const lio_command_t& command) {
+  if (command.command != lio_command_t::BEGIN_ANEW) return "there is no such command";
+  return lio_.begin_anew_after(command.utime, command.session);
 }
 
 void FrontendNode::publish_health() {

@@ -35,6 +35,7 @@ class FrontendNode {
   void on_scan_part(const scan_t& part);
   void on_request(const keyframe_request_t& request);
   void on_cloud_request(const keyframe_request_t& request);
+  [[nodiscard]] const char* on_command(const lio_command_t& command);
   [[nodiscard]] std::optional<std::size_t> resend_keyframe(std::int32_t session, std::int32_t id);
   void publish_state(const NavState& state, std::int32_t session, const Matrix15d* covariance);
   void publish_scan(const ScanResult& scan, double milliseconds);

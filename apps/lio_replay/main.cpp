@@ -87,14 +87,16 @@ runtime::ExitCode replay(const runtime::Application& application, const Options&
                                            : input->inventory().last_utime;
   ReplayProgress progress(first, last);
   const Pace pace(speed);
-  input->run([&](const ImuSample& sample) { pipeline.add_imu(sample); },
-             [&](Scan scan) { pipeline.add_scan(std::move(scan)); },
-             [&](Utime utime) {
-               if (utime > last) return false;
-               progress.show(utime);
-               pace.wait_for(seconds_between(first, utime));
-               return !runtime::stop_requested();
-             });
+  input->run({.on_imu = [&](const ImuSample& sample) { pipeline.add_imu(sample); },
+              .on_scan = [&](Scan scan) { pipeline.add_scan(std::move(scan)); },
+              .on_command = [&](const lio_command_t& command) { pipeline.take_command(command); },
+              .proceed =
+                  [&](Utime utime) {
+                    if (utime > last) return false;
+                    progress.show(utime);
+                    pace.wait_for(seconds_between(first, utime));
+                    return !runtime::stop_requested();
+                  }});
   const ReplayResult result = pipeline.finish();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - began;
   const ReplayTiming timing{.wall_s = wall.count()};

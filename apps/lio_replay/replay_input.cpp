@@ -17,6 +17,8 @@ namespace {
 
 namespace channels = runtime::channels;
 
+constexpr Utime kEarliest = std::numeric_limits<Utime>::min();
+
 /// Gives back the pages of a log after every so many bytes read.
 class PageRelease {
  public:
@@ -65,6 +67,8 @@ void ReplayInput::index(const messages::LogEvent& event) {
     index_imu(event);
   } else if (event.channel == channels::kScan) {
     index_scan(event);
+  } else if (event.channel == channels::kLioCommand) {
+    index_command(event);
   } else if (event.channel == channels::kGroundTruth) {
     index_ground_truth(event);
   } else {
@@ -81,7 +85,8 @@ void ReplayInput::index_imu(const messages::LogEvent& event) {
     return;
   }
   ++inventory_.used[channels::kImu];
-  entries_.push_back({.utime = imu.utime, .sequence = imu.sequence, .is_scan = false, .data = event.data});
+  newest_imu_ = std::max(newest_imu_.value_or(imu.utime), imu.utime);
+  entries_.push_back({.utime = imu.utime, .sequence = imu.sequence, .kind = Kind::kImu, .data = event.data});
 }
 
 void ReplayInput::index_scan(const messages::LogEvent& event) {
@@ -91,7 +96,18 @@ void ReplayInput::index_scan(const messages::LogEvent& event) {
     return;
   }
   ++inventory_.used[channels::kScan];
-  entries_.push_back({head->utime, head->sequence, head->part, head->part_count, true, event.data});
+  entries_.push_back({head->utime, head->sequence, head->part, head->part_count, Kind::kScan, event.data});
+}
+
+/// Its stamp is when it is due; it was heard behind the newest sample that was recorded until then.
+void ReplayInput::index_command(const messages::LogEvent& event) {
+  lio_command_t command;
+  if (!messages::decode_checked(event.data, command)) {
+    ++inventory_.undecodable;
+    return;
+  }
+  ++inventory_.used[channels::kLioCommand];
+  if (newest_imu_) entries_.push_back({.utime = *newest_imu_, .kind = Kind::kCommand, .data = event.data});
 }
 
 void ReplayInput::index_health(const messages::LogEvent& event) {
@@ -105,15 +121,15 @@ void ReplayInput::index_health(const messages::LogEvent& event) {
 }
 
 void ReplayInput::sort_entries() {
-  Utime newest[2] = {std::numeric_limits<Utime>::min(), std::numeric_limits<Utime>::min()};
+  Utime newest[] = {kEarliest, kEarliest, kEarliest};
   for (const Entry& entry : entries_) {
-    Utime& before = newest[entry.is_scan ? 1 : 0];
+    Utime& before = newest[static_cast<std::size_t>(entry.kind)];
     if (entry.utime < before) ++inventory_.out_of_order;
     before = std::max(before, entry.utime);
   }
   // At equal stamps the IMU goes first; parts of one scan share their stamp and keep their order.
   std::ranges::stable_sort(entries_, [](const Entry& a, const Entry& b) {
-    return a.utime != b.utime ? a.utime < b.utime : a.is_scan < b.is_scan;
+    return a.utime != b.utime ? a.utime < b.utime : a.kind < b.kind;
   });
 }
 
@@ -140,13 +156,13 @@ void ReplayInput::count_missing() {
     return count;
   };
   for (const Entry& entry : entries_) {
-    if (entry.is_scan) {
+    if (entry.kind == Kind::kScan) {
       inventory_.missing_scans += missed(last_scan, scan_sequence.observe(entry.sequence), "of L1_SCAN");
       const std::int64_t incomplete = assembler.incomplete();
       (void)assembler.add(entry);
       missed(last_scan, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
       last_scan = entry.utime;
-    } else {
+    } else if (entry.kind == Kind::kImu) {
       inventory_.missing_imu += missed(last_imu, imu_sequence.observe(entry.sequence), "of L1_IMU");
       last_imu = entry.utime;
     }
@@ -155,18 +171,20 @@ void ReplayInput::count_missing() {
   inventory_.first_drop = earlier(inventory_.first_drop, gap);
 }
 
-void ReplayInput::run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(Scan)>& on_scan,
-                      const std::function<bool(Utime)>& proceed) const {
+void ReplayInput::run(const Handlers& handlers) const {
   messages::EncodedScanAssembler assembler;
   PageRelease pages(log_);
   for (const Entry& entry : entries_) {
-    if (!proceed(entry.utime)) return;
+    if (!handlers.proceed(entry.utime)) return;
     pages.read(entry.data.size());
     imu_t imu;
-    if (entry.is_scan) {
-      if (std::optional<Scan> scan = assembler.add(entry.data)) on_scan(*std::move(scan));
+    lio_command_t command;
+    if (entry.kind == Kind::kScan) {
+      if (std::optional<Scan> scan = assembler.add(entry.data)) handlers.on_scan(*std::move(scan));
+    } else if (entry.kind == Kind::kCommand && messages::decode_checked(entry.data, command)) {
+      handlers.on_command(command);
     } else if (messages::decode_checked(entry.data, imu)) {
-      on_imu(messages::from_message(imu));
+      handlers.on_imu(messages::from_message(imu));
     }
   }
 }

@@ -12,6 +12,7 @@
 
 #include "common/measurements.h"
 #include "common/trajectory_file.h"
+#include "ignis/lio_command_t.hpp"
 #include "log_listing.h"
 #include "messages/lcm_log.h"
 #include "recorded_drop.h"
@@ -50,23 +51,33 @@ class ReplayInput {
   /// Of the live run whose log this is; empty in a log of sensor data alone.
   [[nodiscard]] const RecordedResults& live_results() const { return live_results_; }
 
-  /// Calls the handlers with every measurement, in time order; stops early when `proceed` returns false.
-  void run(const std::function<void(const ImuSample&)>& on_imu, const std::function<void(Scan)>& on_scan,
-           const std::function<bool(Utime)>& proceed) const;
+  struct Handlers {
+    std::function<void(const ImuSample&)> on_imu;
+    std::function<void(Scan)> on_scan;
+    std::function<void(const lio_command_t&)> on_command;  ///< to the front end, at the instant it was recorded
+    std::function<bool(Utime)> proceed;                    ///< asked before each of them [us]; false: stop here
+  };
+
+  /// Calls the handlers with every measurement and command, in time order.
+  void run(const Handlers& handlers) const;
 
  private:
+  /// In the order of their turns at equal stamps: a command is about what is behind it, and a scan needs the samples up
+  /// to its end.
+  enum class Kind : std::uint8_t { kImu, kCommand, kScan };
   struct Entry {
     Utime utime = 0;
     std::int32_t sequence = 0;
     std::int16_t part = 0;
     std::int16_t part_count = 1;
-    bool is_scan = false;
+    Kind kind = Kind::kImu;
     std::span<const std::byte> data;
   };
 
   void index(const messages::LogEvent& event);
   void index_imu(const messages::LogEvent& event);
   void index_scan(const messages::LogEvent& event);
+  void index_command(const messages::LogEvent& event);
   void index_ground_truth(const messages::LogEvent& event);
   void index_health(const messages::LogEvent& event);
   void require(const std::filesystem::path& file, const char* channel) const;
@@ -78,6 +89,7 @@ class ReplayInput {
   LogInventory inventory_;
   std::vector<Entry> entries_;
   RecordedResults live_results_;
+  std::optional<Utime> newest_imu_;     // [us] of those that were indexed
   std::optional<Utime> newest_health_;  // [us] of the live front end, while it had lost nothing
   Trajectory ground_truth_;
 };

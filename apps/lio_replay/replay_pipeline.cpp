@@ -31,6 +31,10 @@ void ReplayPipeline::add_scan(Scan scan) {
   for (ScanResult& each : scans) hand_over(std::move(each), frontend_timer_.newest_ms());
 }
 
+void ReplayPipeline::take_command(const lio_command_t& command) {
+  if (command.command == lio_command_t::BEGIN_ANEW) (void)lio_.begin_anew_after(command.utime, command.session);
+}
+
 void ReplayPipeline::hand_over(ScanResult scan, double milliseconds) {
   if (!steps_.push({std::move(scan), milliseconds})) std::rethrow_exception(failure_);
 }

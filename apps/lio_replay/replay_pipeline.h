@@ -6,6 +6,7 @@
 
 #include "bounded_queue.h"
 #include "frontend/lio.h"
+#include "ignis/lio_command_t.hpp"
 #include "replay_follower.h"
 
 namespace ignis {
@@ -24,6 +25,9 @@ class ReplayPipeline {
   /// Both throw what back end or map have thrown meanwhile; then only the end of the pipeline may follow.
   void add_imu(const ImuSample& sample);
   void add_scan(Scan scan);
+
+  /// What the live front end refused is refused here as well.
+  void take_command(const lio_command_t& command);
 
   /// Places everything at its final pose. Call once, at the end. Throws what back end or map have thrown.
   [[nodiscard]] ReplayResult finish();

@@ -12,6 +12,7 @@ inline constexpr char kScanStats[] = "LIO_SCAN_STATS";
 inline constexpr char kCloud[] = "LIO_CLOUD";
 inline constexpr char kCloudAgain[] = "LIO_CLOUD_AGAIN";
 inline constexpr char kCloudRequest[] = "CLOUD_REQUEST";
+inline constexpr char kLioCommand[] = "LIO_COMMAND";
 inline constexpr char kKeyframe[] = "LIO_KEYFRAME";
 inline constexpr char kKeyframeRequest[] = "KEYFRAME_REQUEST";
 inline constexpr char kGraphCommand[] = "GRAPH_COMMAND";

@@ -19,7 +19,9 @@ from ignis.errors import InputError
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 # Several processes send on these, each with its own running number.
-SHARED_CHANNELS = frozenset({"HEALTH", "KEYFRAME_REQUEST", "CLOUD_REQUEST", "LIO_CLOUD_AGAIN", "GRAPH_COMMAND"})
+SHARED_CHANNELS = frozenset(
+    {"HEALTH", "KEYFRAME_REQUEST", "CLOUD_REQUEST", "LIO_CLOUD_AGAIN", "LIO_COMMAND", "GRAPH_COMMAND"}
+)
 RATE_WINDOW_S = 5.0
 _QUEUE = 5000
 

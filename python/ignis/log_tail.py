@@ -12,7 +12,15 @@ _HEAD = struct.Struct(">4sqqii")
 _SEQUENCE = struct.Struct(">8xqi")
 _MAX_CHANNEL = 63
 # Several senders share these channels, or number them for somebody else: gaps mean nothing.
-_UNNUMBERED = ("HEALTH", "KEYFRAME_REQUEST", "CLOUD_REQUEST", "LIO_CLOUD_AGAIN", "GRAPH_COMMAND", "IGNIS_CONFIG")
+_UNNUMBERED = (
+    "HEALTH",
+    "KEYFRAME_REQUEST",
+    "CLOUD_REQUEST",
+    "LIO_CLOUD_AGAIN",
+    "LIO_COMMAND",
+    "GRAPH_COMMAND",
+    "IGNIS_CONFIG",
+)
 # A number this far below the newest means that the sender began anew.
 _RESTART_DISTANCE = 1000
 _CHUNK = 4 << 20

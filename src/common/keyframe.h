@@ -12,7 +12,7 @@ namespace ignis {
 /// What the front end hands to the back end and the map every few metres.
 struct Keyframe {
   std::int32_t id = 0;                           ///< 0, 1, 2 ... never reused within a session
-  std::int32_t session = 0;                      ///< +1 per reset of the front end
+  std::int32_t session = 0;                      ///< +1 whenever the front end begins anew
   NavState state;                                ///< at the keyframe's instant, frame odom
   Matrix15d covariance = Matrix15d::Identity();  ///< order of ErrorBlock
   /// Information that scan matching and standing still, without the IMU (posterior minus prediction), hold on the pose

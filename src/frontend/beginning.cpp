@@ -12,6 +12,8 @@ namespace {
 constexpr int kScansOfMovingStart = 2;                          // one gives a velocity, the second confirms it
 constexpr int kScansToConfirmMotion = 40;                       // of an L1, as long as the second opinion looks back
 constexpr int kScansToConfirmSession = 60;                      // and something to go on
+constexpr Utime kMostLeadUs = 2 * kMicrosPerSecond;             // of a command to begin anew
+constexpr Utime kHandOverUs = 150'000;                          // a scan comes later than the sample at its end
 constexpr std::int64_t kAskingPeriodUs = 3 * kMicrosPerSecond;  // of scans, which takes a quarter of it
 
 /// The position from which a new map begins is exact by definition.
@@ -27,6 +29,41 @@ double velocity_sigma(const FilterState& filter) {
 }
 
 }  // namespace
+
+const char* Lio::begin_anew_after(Utime utime, std::int32_t session) {
+  if (session != session_) return "it is not this session that is to end";
+  if (imu_.empty()) return "no IMU data have come, so there is nothing to end";
+  const Utime lead = utime - imu_.newest();
+  if (lead < 0 || lead > kMostLeadUs) return "the stamp is not of the two seconds ahead";
+  session_end_ = SessionEnd{session, utime};
+  return "";
+}
+
+bool Lio::ends_with(Utime sample) const {
+  return session_end_ && session_end_->session == session_ && sample > session_end_->utime;
+}
+
+/// Scans that wait then end behind the last sample of the old session, and belong to the new one.
+void Lio::begin_anew() {
+  std::deque<Scan> waiting = std::move(pending_);
+  reset();
+  pending_ = std::move(waiting);
+  start_note_ = "new session: a command said so";
+}
+
+bool Lio::falls_to_ended_session(const Scan& scan) const {
+  return session_end_ && session_end_->session <= session_ && scan.end_utime() <= session_end_->utime &&
+         scan.end_utime() > session_end_->utime - kHandOverUs;
+}
+
+ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
+  ScanResult result;
+  result.stats.utime = scan.end_utime();
+  result.stats.scan_sequence = scan.sequence;
+  result.stats.session = session_end_->session;
+  result.stats.reason = ScanReason::kSessionEnded;
+  return result;
+}
 
 void Lio::start(const FilterState& first) {
   filter_ = first;

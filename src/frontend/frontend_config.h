@@ -217,7 +217,7 @@ struct FrontendConfig {
                  "neighbour radius for points that find too few within match_radius_m; 0: none");
     visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",
                  "scan time without IMU data after which scans go on alone, at constant velocity");
-    visit.number("resume_max_gap_s", self.resume_max_gap_s, {0.0, 10.0}, "s",
+    visit.number("resume_max_gap_s", self.resume_max_gap_s, {0.0, 3.0}, "s",
                  "a restarted front end goes on where its predecessor was killed when the IMU data that it missed are "
                  "no longer than this; 0: it always begins a new session");
     visit.number("degraded_sigma_m", self.degraded_sigma_m, {0.001, 1000.0}, "m",
@@ -252,7 +252,7 @@ struct FrontendConfig {
     visit.number("stationary_speed", self.stationary_speed, {1e-3, 1.0}, "m/s",
                  "slower counts as standing; up to four times that while the velocity is uncertain");
     visit.number("zero_velocity_sigma", self.zero_velocity_sigma, {0.0, 1.0}, "m/s",
-                 "what standing says about the velocity, per scan; 0: standing is not used");
+                 "what standing says about the velocity, four times a second; 0: standing is not used");
     visit.number("scan_voxel_m", self.scan_voxel_m, {0.0, 5.0}, "m",
                  "scans of more than max_scan_points keep one point per such voxel before anything else; 0: all");
     visit.flag("deskew", self.deskew, "off: points are taken as measured at the scan's end (no point times)");

@@ -99,6 +99,10 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
   const Silence silence = before ? bridge_silence(*before, sample.utime, result.scans) : Silence::kNone;
   if (silence == Silence::kTooLong) return result;
+  if (ends_with(sample.utime)) {
+    begin_anew();
+    return result;
+  }
   trust_.note_imu(sample.utime);
   if (believed.saturated) last_clipped_ = sample.utime;
 
@@ -129,6 +133,10 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
                       (last_scan_end_ && scan.end_utime() <= *last_scan_end_) ||
                       (!imu_.empty() && scan.end_utime() > imu_.newest() + kMaxLeadUs);
   std::vector<ScanResult> results;
+  if (falls_to_ended_session(scan)) {
+    results.push_back(verdict_of_ended_session(scan));
+    return results;
+  }
   if (resumed_from_) {
     results.push_back(refuse(scan, ScanReason::kNoImu));
     return results;
@@ -333,8 +341,8 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (match.stats.applied()) {
     if (match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
     // The covariance of a pose in a young map holds the map's noise, which must not be left behind in it once more, and
-    // the gyro's, which is: the root lies between (docs/front_end.md, The heading of a young map). Gravity is doubted
-    // by the smaller of the two: with the larger one sixteen beams lost their way.
+    // the gyro's, which is: the root lies between (docs/front_end_results.md, The heading of a young map). Gravity is
+    // doubted by the smaller of the two: with the larger one sixteen beams lost their way.
     const double noise = std::sqrt(match.map_noise);
     const Eigen::Matrix3d turn = drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body,
                                                  match.map_age_scans / noise, blind_shifts(match.degeneracy));

@@ -67,6 +67,12 @@ class Lio {
   /// Forgets everything and starts a new session.
   void reset();
 
+  /// The same, by a command, with the first sample behind `utime`, which the new session does not use. Scans that end
+  /// in the 150 ms up to then are refused, so that it does not matter which of them come behind that sample. `session`
+  /// is the one that ends; the stamp lies ahead of the newest sample by two seconds at most. Why it cannot be; empty
+  /// when it will.
+  [[nodiscard]] const char* begin_anew_after(Utime utime, std::int32_t session);
+
   /// After its state has been read back from bytes (see checkpoint.h): speed and turn rate go on over the time since
   /// then, and scans are searched for widely. Until ten of them have confirmed the pose none enters the map,
   /// no keyframe is made, and three in a row that contradict take back what the others said. A new session begins when
@@ -117,6 +123,10 @@ class Lio {
   void start_moving(const FilterState& first);
   [[nodiscard]] std::string start_text() const;
   void ask_scans_for_motion();
+  [[nodiscard]] bool ends_with(Utime sample) const;
+  void begin_anew();
+  [[nodiscard]] bool falls_to_ended_session(const Scan& scan) const;
+  [[nodiscard]] ScanResult verdict_of_ended_session(const Scan& scan) const;
   void give_up_resumption();
   void close_gap(Utime first_sample);
   enum class Silence : std::int8_t { kNone, kBridged, kTooLong };  ///< of both streams: what became of it
@@ -124,6 +134,12 @@ class Lio {
   void seek_confirmation(ScanReason reason);
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;
+
+  /// A command said so.
+  struct SessionEnd {
+    std::int32_t session = 0;
+    Utime utime = 0;  ///< the first sample behind it begins the next one
+  };
 
   static constexpr int kScansUntilReacquisition = 5;  ///< without a correction
 
@@ -162,6 +178,7 @@ class Lio {
   std::optional<Utime> resumed_from_;     ///< newest sample of the predecessor, until the first own one
   std::optional<Utime> confirm_until_;    ///< when a resumption is given up
   std::optional<FilterState> unaided_;    ///< the same state without a scan since the resumption, until it is confirmed
+  std::optional<SessionEnd> session_end_;
   std::string start_note_;
 
   /// Everything that later results depend on. Scans that wait for their IMU samples are left out: they are lost with

@@ -26,7 +26,7 @@ constexpr double kLeastThatFits = 0.9;
 constexpr double kMemory = 2.0;       // s, in which such scans are forgotten
 constexpr double kDoubtful = 0.5;     // such scans within the memory: patches that have moved are left out
 constexpr double kRestless = 2.5;     // the same, for what is younger than kSettled to be left out as well
-constexpr double kQuiet = 0.25;       // and for it to be believed again: five seconds later
+constexpr double kQuiet = 0.25;       // and for it to be believed again: 5 to 10 s later
 constexpr double kSettled = 2.0;      // s: what moves leaves a trail behind that is younger, and has left what is older
 constexpr double kKnownSpeed = 0.15;  // m/s, sigma: beyond, what walks by is not found out
 

@@ -33,6 +33,8 @@ std::string_view text(ScanReason reason) {
       return "numerical failure";
     case ScanReason::kTooOften:
       return "overlaps the scan before it, or came too soon after it";
+    case ScanReason::kSessionEnded:
+      return "its session was ended by a command";
   }
   return "unknown reason";
 }

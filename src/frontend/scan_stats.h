@@ -28,6 +28,7 @@ enum class ScanReason : std::int8_t {
   kNoImu = 11,
   kNumericalFailure = 12,
   kTooOften = 13,
+  kSessionEnded = 14,
 };
 
 /// The reason in words.
@@ -40,10 +41,10 @@ enum class ScanReason : std::int8_t {
 struct ScanStats {
   Utime utime = 0;  ///< [us] end of the scan
   std::int32_t scan_sequence = 0;
-  std::int32_t session = 0;  ///< +1 per reset
+  std::int32_t session = 0;  ///< +1 whenever the front end begins anew
   ScanReason reason = ScanReason::kNotInitialised;
   int points = 0;                    ///< after the range filter
-  int matched = 0;                   ///< points that found a plane, new surfaces left out
+  int matched = 0;                   ///< points that found a plane, without what is new or moves
   int used = 0;                      ///< of these, inside the Mahalanobis gate in the last pass
   double mean_innovation = 0.0;      ///< [m] mean absolute distance at the predicted pose
   double mean_residual = 0.0;        ///< [m] the same at the corrected pose
@@ -55,7 +56,7 @@ struct ScanStats {
   /// Normalised innovation squared of the scan, in the directions that it observes; nis_directions on average.
   double nis = 0.0;
   int nis_directions = 0;
-  bool standing = false;          ///< the vehicle stood, and the velocity was corrected to zero
+  bool standing = false;          ///< the vehicle stands
   double imu_disagreement = 0.0;  ///< [sigma] by which scans and IMU disagree about the last two seconds
   std::string unobserved;         ///< these directions in words, see describe()
   Pose T_odom_body;               ///< after this scan

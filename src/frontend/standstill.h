@@ -12,7 +12,7 @@ namespace ignis {
 /// Windows of this length have to be quiet; between two corrections there is half of one.
 inline constexpr Utime kStandstillWindowUs = kMicrosPerSecond / 2;
 
-/// What standing says: the velocity was zero a tenth of a second ago, so that a vehicle which has just set off is not
+/// What standing says: the velocity was zero a fifth of a second ago, so that a vehicle which has just set off is not
 /// held back before its acceleration shows, and so was the turn rate over the half window before that. Order of rows:
 /// velocity (odom axes) [m/s], turn rate (body axes) [rad/s].
 struct Standstill {

@@ -151,7 +151,8 @@ std::string TrustMonitor::reason() const {
   if (seconds_without_imu() > kSilentImuSeconds) {
     return std::format("no IMU data for {:.1f} s, going on with scans alone", seconds_without_imu());
   }
-  if (disagreement() <= kMaxDisagreement && !uncertain_start_.empty()) {
+  const bool disagree = disagreement() > kMaxDisagreement;
+  if (!disagree && !uncertain_start_.empty()) {
     return std::format("{}, {} applied scans to go", uncertain_start_, scans_to_confirm_);
   }
   if (resumed_)
@@ -161,8 +162,9 @@ std::string TrustMonitor::reason() const {
     return std::format("scans took back a velocity that the IMU is sure of, it was restored ({} applied scans to go)",
                        scans_to_confirm_);
   }
-  if (scans_to_confirm_ > 0) return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
-  if (disagreement() > kMaxDisagreement) {
+  if (scans_to_confirm_ > 0 && uncertain_start_.empty())
+    return std::format("IMU data are back, {} applied scans to go", scans_to_confirm_);
+  if (disagree) {
     return std::format("scan motion and IMU motion disagree by {:.0f} sigma over {:.0f} s", disagreement(),
                        kOpinionSeconds);
   }

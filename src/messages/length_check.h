@@ -12,6 +12,7 @@
 #include "ignis/imu_t.hpp"
 #include "ignis/keyframe_request_t.hpp"
 #include "ignis/keyframe_t.hpp"
+#include "ignis/lio_command_t.hpp"
 #include "ignis/loop_result_t.hpp"
 #include "ignis/map_status_t.hpp"
 #include "ignis/pose_t.hpp"
@@ -66,6 +67,7 @@ inline constexpr LayoutStep kKeyframe[] = {{kFixed, 8 + 3 * 4 + 2 + 2 + 8 + 2 + 
                                            {kArray, 3 * 2 + 1}};
 inline constexpr LayoutStep kKeyframeRequest[] = {{kFixed, 8 + 4 + 4}, {kString}, {kCount}, {kArray, 4}};
 inline constexpr LayoutStep kGraphCommand[] = {{kFixed, 8 + 4 + 4 + 1}, {kString}, {kFixed, 4 + 4}};
+inline constexpr LayoutStep kLioCommand[] = {{kFixed, 8 + 4 + 4 + 1}, {kString}};
 inline constexpr LayoutStep kSmoothedKeyframes[] = {
     {kFixed, 8 + 3 * 4 + 2 + 2 + 1 + 2 * 4 + (3 + 4 + 36) * 8}, {kCount}, {kArray, 4 + 7 * 8}};
 inline constexpr LayoutStep kLoopResult[] = {{kFixed, 8 + 5 * 4 + 3}, {kString}, {kFixed, 2 * 4 + 7 * 8 + 7 * 8}};
@@ -94,6 +96,8 @@ template <>
 inline constexpr std::span<const LayoutStep> kLayout<keyframe_request_t> = layouts::kKeyframeRequest;
 template <>
 inline constexpr std::span<const LayoutStep> kLayout<graph_command_t> = layouts::kGraphCommand;
+template <>
+inline constexpr std::span<const LayoutStep> kLayout<lio_command_t> = layouts::kLioCommand;
 template <>
 inline constexpr std::span<const LayoutStep> kLayout<smoothed_keyframes_t> = layouts::kSmoothedKeyframes;
 template <>

@@ -30,7 +30,7 @@ namespace ignis::messages {
 struct PosedCloud {
   Utime utime = 0;            ///< [us] end of the scan
   std::int32_t sequence = 0;  ///< +1 per cloud
-  std::int32_t session = 0;   ///< +1 per reset of the front end
+  std::int32_t session = 0;   ///< +1 whenever the front end begins anew
   bool applied = false;       ///< the scan corrected the state
   Pose T_odom_body;
   std::vector<CloudPoint> points;

@@ -27,9 +27,9 @@ std::uint64_t fingerprint_of(std::span<const std::byte> data) {
 }
 
 std::string type_name(std::uint64_t fingerprint) {
-  const std::string name =
-      name_among<cloud_t, driver_status_t, graph_command_t, health_t, imu_t, keyframe_request_t, keyframe_t,
-                 loop_result_t, map_status_t, pose_t, scan_stats_t, scan_t, smoothed_keyframes_t, state_t>(fingerprint);
+  const std::string name = name_among<cloud_t, driver_status_t, graph_command_t, health_t, imu_t, keyframe_request_t,
+                                      keyframe_t, lio_command_t, loop_result_t, map_status_t, pose_t, scan_stats_t,
+                                      scan_t, smoothed_keyframes_t, state_t>(fingerprint);
   return name.empty() ? std::format("type 0x{:016x}, which is none of ours", fingerprint) : name;
 }
 

@@ -52,6 +52,7 @@ def test_fault_b5_damaged_messages_leave_graph_and_keyframes_as_they_are(
             ("lio_frontend", "L1_SCAN"),
             ("lio_frontend", "KEYFRAME_REQUEST"),
             ("lio_frontend", "CLOUD_REQUEST"),
+            ("lio_frontend", "LIO_COMMAND"),
             ("graph_backend", "LIO_KEYFRAME"),
             ("graph_backend", "LIO_STATE"),
             ("graph_backend", "GRAPH_COMMAND"),

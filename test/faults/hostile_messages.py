@@ -23,6 +23,7 @@ CHANNELS: dict[str, Any] = {
     "L1_SCAN": types.scan_t,
     "KEYFRAME_REQUEST": types.keyframe_request_t,
     "CLOUD_REQUEST": types.keyframe_request_t,
+    "LIO_COMMAND": types.lio_command_t,
     "LIO_KEYFRAME": types.keyframe_t,
     "LIO_STATE": types.state_t,
     "LIO_CLOUD": types.cloud_t,
@@ -124,6 +125,14 @@ def unbelievable(channel: str, generator: random.Random) -> Iterator[bytes]:
         yield message.encode()
     elif channel == "SMOOTHED_KEYFRAMES":
         message.map_odom_quaternion, message.session = [bad, 0.0, 0.0, 0.0], generator.choice([0, LARGEST])
+        yield message.encode()
+    elif channel == "LIO_COMMAND":
+        # Another session, a stamp long past, no command.
+        message.session, message.utime = generator.choice([-1, 1, LARGEST]), FAR_FUTURE
+        yield message.encode()
+        message.session, message.utime = 0, 0
+        yield message.encode()
+        message.command, message.utime = 77, FAR_FUTURE
         yield message.encode()
     elif channel == "GRAPH_COMMAND":
         message.command, message.session = 77, -1

@@ -162,6 +162,14 @@ TEST(TrustMonitor, AStartThatScansSawMovingIsOkAfterFortyOfThem) {
   expect(feed.monitor, Trust::kOk, "OK");
 }
 
+TEST(TrustMonitor, AStartThatTheImuContradictsSaysSo) {
+  Feed feed;
+  feed.monitor.note_uncertain_start("scans do not tell whether it stood", 60);
+  feed.evidence.velocity_correction = {0.0, 0.0, 0.075};
+  feed.run(45);
+  expect(feed.monitor, Trust::kDegraded, "scan motion and IMU motion disagree");
+}
+
 TEST(TrustMonitor, CorrectionsThatCancelOutAreNoContradiction) {
   Feed feed;
   for (int i = 0; i < 60; ++i) {

@@ -43,6 +43,7 @@ void fill(keyframe_t& message) {
   message.intensity = {7, 8, 9};
 }
 void fill(graph_command_t& message) { message.sender = "somebody"; }
+void fill(lio_command_t& message) { message.sender = "somebody"; }
 void fill(keyframe_request_t& message) {
   message.sender = "graph_backend";
   message.num_ids = 2;
@@ -63,9 +64,9 @@ void fill(health_t& message) {
 template <class Message>
 class LengthCheck : public testing::Test {};
 
-using AllTypes =
-    testing::Types<imu_t, scan_t, driver_status_t, state_t, scan_stats_t, cloud_t, keyframe_t, graph_command_t,
-                   keyframe_request_t, smoothed_keyframes_t, loop_result_t, map_status_t, pose_t, health_t>;
+using AllTypes = testing::Types<imu_t, scan_t, driver_status_t, state_t, scan_stats_t, cloud_t, keyframe_t,
+                                graph_command_t, keyframe_request_t, lio_command_t, smoothed_keyframes_t, loop_result_t,
+                                map_status_t, pose_t, health_t>;
 TYPED_TEST_SUITE(LengthCheck, AllTypes);
 
 TYPED_TEST(LengthCheck, AcceptsEveryMessageThatTheEncoderMakes) {

@@ -85,11 +85,30 @@ TEST_F(ReplayInputTest, HandsOutInOrderOfStampsWhateverTheOrderOfRecords) {
   for (const int i : {1, 0, 2}) write_scan(i);
   const ReplayInput input = opened();
   std::vector<Utime> stamps;
-  input.run([&](const ImuSample& sample) { stamps.push_back(sample.utime); },
-            [&](const Scan& scan) { stamps.push_back(scan.utime); }, [](Utime) { return true; });
+  input.run({.on_imu = [&](const ImuSample& sample) { stamps.push_back(sample.utime); },
+             .on_scan = [&](const Scan& scan) { stamps.push_back(scan.utime); },
+             .on_command = [](const lio_command_t&) { ADD_FAILURE() << "there is none"; },
+             .proceed = [](Utime) { return true; }});
   EXPECT_EQ(stamps.size(), 9U);
   EXPECT_TRUE(std::ranges::is_sorted(stamps));
   EXPECT_EQ(input.inventory().out_of_order, 4);  // 1, 4 and 3 of the IMU, 0 of the scans
+}
+
+TEST_F(ReplayInputTest, HandsOutACommandBehindTheNewestSampleThatWasRecordedBeforeIt) {
+  lio_command_t command{};
+  command.utime = 1'000'000;
+  write_message("LIO_COMMAND", command);  // nothing had begun that could end
+  for (const int i : {0, 1, 3, 2}) write_imu(i);
+  write_message("LIO_COMMAND", command);
+  for (const int i : {4, 5}) write_imu(i);
+  write_scan(0);
+  std::vector<Utime> stamps;
+  const ReplayInput input = opened();
+  input.run({.on_imu = [&](const ImuSample& sample) { stamps.push_back(sample.utime); },
+             .on_scan = [](const Scan&) {},
+             .on_command = [&](const lio_command_t& heard) { stamps.push_back(heard.utime); },
+             .proceed = [](Utime) { return true; }});
+  EXPECT_EQ(stamps, (std::vector<Utime>{0, 4'000, 8'000, 12'000, 1'000'000, 16'000, 20'000}));
 }
 
 TEST_F(ReplayInputTest, NamesTheFirstOfAllGaps) {
