@@ -2,7 +2,8 @@
 //
 // graph_drive: the back end alone over recorded keyframes (keyframe_log, or any log of a live run that holds
 // LIO_KEYFRAME), with the processor time of each. Prints one JSON object; with --out also trajectories, loops and
-// graph, and as distributed.tum what the reference would have made of the same loops. Like the processes, it begins anew with each session: what it writes is of the newest.
+// graph, and as distributed.tum what the reference would have made of the same loops. Like the processes, it begins
+// anew with each session: what it writes is of the newest.
 //
 //     build/release/bin/graph_drive KEYFRAMES.lcm --config config/ignis8_tuned.json --set backend.SECTION.KEY=VALUE
 

@@ -15,6 +15,7 @@
 #include "common/file_output.h"
 #include "frontend/lio.h"
 #include "messages/keyframe_messages.h"
+#include "messages/lio_command.h"
 #include "replay_input.h"
 #include "runtime/application.h"
 #include "runtime/channels.h"
@@ -80,12 +81,10 @@ int main(int argc, char** argv) {
         const ReplayInput input(log);
         KeyframeWriter writer(out);
         Lio lio(application.config.frontend.filter);
-        input.run(
-            {.on_imu = [&](const ImuSample& sample) { writer.take(lio.add_imu(sample).scans); },
-             .on_scan = [&](const Scan& scan) { writer.take(lio.add_scan(scan)); },
-             .on_command =
-                 [&](const lio_command_t& command) { (void)lio.begin_anew_after(command.utime, command.session); },
-             .proceed = [](Utime) { return !runtime::stop_requested(); }});
+        input.run({.on_imu = [&](const ImuSample& sample) { writer.take(lio.add_imu(sample).scans); },
+                   .on_scan = [&](const Scan& scan) { writer.take(lio.add_scan(scan)); },
+                   .on_command = [&](const lio_command_t& command) { (void)messages::carry_out(command, lio); },
+                   .proceed = [](Utime) { return !runtime::stop_requested(); }});
         std::cout << writer.commit() << " keyframes\n";
         return runtime::kDone;
       });

@@ -50,6 +50,7 @@ BackendNode::BackendNode(const runtime::Application& application, const std::fil
   if (!graph_.resume_note().empty()) std::cerr << "graph_backend: " << graph_.resume_note() << std::endl;
   T_map_odom_ = graph_.smoother().T_map_odom();
   last_update_ = graph_.smoother().present();
+  newest_utime_ = last_update_.newest.utime;
   keyframe_counts_ = &link_.subscribe<keyframe_t>(channels::kKeyframe, config_.lcm.keyframe_queue,
                                                   [this](const keyframe_t& part) { on_keyframe_part(part); });
   state_counts_ = &link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,

@@ -52,13 +52,14 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
       channels::kCloudRequest, kRequestQueue, [this](const keyframe_request_t& request) { on_cloud_request(request); },
       runtime::Senders::kSeveral);
   link_.subscribe<lio_command_t>(
-      channels::kLioCommand, kRequestQueue, [this](const lio_command_t& command) { return on_command(command); },
-      runtime::Senders::kSeveral);
+      channels::kLioCommand, kRequestQueue,
+      [this](const lio_command_t& command) { return messages::carry_out(command, lio_); }, runtime::Senders::kSeveral);
 }
 
 void FrontendNode::resume() {
   lio_ = start_from_checkpoint(config_.frontend.filter, config_hash_, checkpoints_->load());
   for (const Keyframe& keyframe : checkpoints_->load_keyframes(lio_.session())) sent_keyframes_.add(keyframe);
+  kept_session_ = lio_.session();
 }
 
 /// Before anybody hears of a keyframe it is safe, and so is that its id is used: a successor neither reuses the id nor
@@ -72,7 +73,15 @@ void FrontendNode::keep(std::span<const ScanResult> scans) {
     if (scan.keyframe) checkpoints_->save_keyframe(*scan.keyframe);
   }
   checkpoints_->save(encode_checkpoint(lio_, config_hash_));
+  kept_session_ = lio_.session();
   last_checkpoint_ = scans.back().stats.utime;
+}
+
+/// Until the next one has started there is nothing to go on from, and its number must not be given out twice.
+void FrontendNode::keep_end_of_session() {
+  if (!checkpoints_ || lio_.session() == kept_session_ || lio_.can_be_resumed()) return;
+  checkpoints_->save(encode_ended_session(lio_.session(), config_hash_));
+  kept_session_ = lio_.session();
 }
 
 void FrontendNode::spin_once() {
@@ -88,6 +97,7 @@ void FrontendNode::on_imu(const imu_t& message) {
     ++imu_counts_->rejected;
   }
   publish(result.scans, milliseconds);
+  keep_end_of_session();
   if (!result.state) return;
   const std::optional<Matrix15d> owed = order_.take_sample(lio_.session(), result.state->utime);
   publish_state(*result.state, lio_.session(), owed ? &*owed : nullptr);
@@ -184,11 +194,6 @@ void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
     parts += sent->parts.size() + *keyframe_parts;
     if (parts >= kMostResentParts) return;
   }
-}
-
-const char* FrontendNode::on_command(const lio_command_t& command) {
-  if (command.command != lio_command_t::BEGIN_ANEW) return "there is no such command";
-  return lio_.begin_anew_after(command.utime, command.session);
 }
 
 void FrontendNode::publish_health() {

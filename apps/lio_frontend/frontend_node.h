@@ -10,6 +10,7 @@
 #include "checkpoint_folder.h"
 #include "frontend/lio.h"
 #include "messages/keyframe_messages.h"
+#include "messages/lio_command.h"
 #include "messages/odometry_messages.h"
 #include "messages/sensor_messages.h"
 #include "runtime/lcm_link.h"
@@ -35,7 +36,6 @@ class FrontendNode {
   void on_scan_part(const scan_t& part);
   void on_request(const keyframe_request_t& request);
   void on_cloud_request(const keyframe_request_t& request);
-  [[nodiscard]] const char* on_command(const lio_command_t& command);
   [[nodiscard]] std::optional<std::size_t> resend_keyframe(std::int32_t session, std::int32_t id);
   void publish_state(const NavState& state, std::int32_t session, const Matrix15d* covariance);
   void publish_scan(const ScanResult& scan, double milliseconds);
@@ -45,6 +45,7 @@ class FrontendNode {
   void publish_health();
   void resume();
   void keep(std::span<const ScanResult> scans);
+  void keep_end_of_session();
 
   runtime::IgnisConfig config_;
   std::string config_hash_;
@@ -58,6 +59,7 @@ class FrontendNode {
   SentKeyframes sent_keyframes_{CheckpointFolder::kKeyframes};
   SentClouds sent_clouds_{10 * kMicrosPerSecond, 32'000'000};  // [us], [bytes]
   std::unique_ptr<CheckpointFolder> checkpoints_;
+  std::int32_t kept_session_ = 0;        // of the checkpoint
   std::string told_note_;                // Lio::start_note() as it was last printed
   Utime last_checkpoint_ = 0;            // [us] scan time
   RateLimit resends_{100.0, 100.0};      // keyframes a second; back end and map together ask for at most 85

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // lio_frontend: L1_IMU and L1_SCAN in; LIO_STATE at each IMU sample, LIO_SCAN_STATS and LIO_CLOUD at each scan and
-// LIO_KEYFRAME every few metres out. KEYFRAME_REQUEST makes it send keyframes again, CLOUD_REQUEST the newest clouds as
-// LIO_CLOUD_AGAIN. With a checkpoint, a killed process is succeeded by one that goes on in the same session.
+// LIO_KEYFRAME every few metres out. LIO_COMMAND begins a new session. KEYFRAME_REQUEST makes it send keyframes again,
+// CLOUD_REQUEST the newest clouds as LIO_CLOUD_AGAIN. With a checkpoint, a killed process is succeeded by one that goes
+// on in the same session.
 
 #include "frontend_node.h"
 

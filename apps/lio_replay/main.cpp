@@ -81,7 +81,8 @@ runtime::ExitCode replay(const runtime::Application& application, const Options&
   const std::unique_ptr<ReplayInput> input = open_log(options.log);
   make_folder(options.folder);
   GraphComparison graph(input->live_results());
-  ReplayPipeline pipeline(application.config, !options.no_loops, &graph);
+  ReplayPipeline pipeline(application.config, !options.no_loops, &graph,
+                          input->live_results().first_session.value_or(0));
   const Utime first = input->inventory().first_utime;
   const Utime last = options.until_s > 0.0 ? std::min(input->inventory().last_utime, first + to_micros(options.until_s))
                                            : input->inventory().last_utime;

@@ -21,6 +21,10 @@ void RecordedResults::add(const messages::LogEvent& event) {
   for (const auto& [channel, list] : kept) {
     if (event.channel == channel) list->push_back(event.data);
   }
+  scan_stats_t stats;
+  if (!first_session && event.channel == channels::kScanStats && messages::decode_checked(event.data, stats)) {
+    first_session = stats.session;
+  }
   graph_command_t command;
   if (!first_command && event.channel == channels::kGraphCommand && messages::decode_checked(event.data, command) &&
       command.command != graph_command_t::SEND_FULL_SET) {

@@ -21,7 +21,8 @@ struct RecordedResults {
   Messages revisions;
   Messages smoothed_states;
   Messages loops;
-  std::optional<Utime> first_command;  ///< [us] somebody took a loop out of the live graph; a replay does not
+  std::optional<std::int32_t> first_session;  ///< of the front end: it may have begun anew before the log did
+  std::optional<Utime> first_command;         ///< [us] somebody took a loop out of the live graph; a replay does not
 
   /// Keeps the event when it is one of these.
   void add(const messages::LogEvent& event);

@@ -18,11 +18,13 @@ BackendConfig for_replay(BackendConfig config, bool use_loops) {
 
 }  // namespace
 
-ReplayFollower::ReplayFollower(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener)
+ReplayFollower::ReplayFollower(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener,
+                               std::int32_t session)
     : backend_config_(for_replay(config.backend, use_loops)),
       loop_gates_(config.frontend.loop_gates),
       smoother_(backend_config_, loop_gates_),
       map_(config.map),
+      session_(session),
       listener_(listener) {
   map_.draw_at_rebuild();  // finish() does; nobody looks before
 }

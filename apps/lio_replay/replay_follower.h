@@ -26,7 +26,7 @@ namespace ignis {
 class ReplayFollower {
  public:
   /// `listener` may be null; it outlives the follower.
-  ReplayFollower(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener);
+  ReplayFollower(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener, std::int32_t session = 0);
 
   /// `milliseconds`: what the scan took in the front end.
   void take(const ScanResult& scan, double milliseconds);
@@ -60,7 +60,7 @@ class ReplayFollower {
   LiveMap map_;
   messages::KeyframeAssembler assembler_;
   std::map<std::int32_t, KeyframeCorrection> keyframes_;
-  std::int32_t session_ = 0;
+  std::int32_t session_;
   GraphListener* listener_;
   ReplayResult result_;
   StageTimer backend_timer_;

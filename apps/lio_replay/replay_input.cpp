@@ -85,7 +85,9 @@ void ReplayInput::index_imu(const messages::LogEvent& event) {
     return;
   }
   ++inventory_.used[channels::kImu];
-  newest_imu_ = std::max(newest_imu_.value_or(imu.utime), imu.utime);
+  if (!newest_imu_ || (imu.utime > *newest_imu_ && !imu_leaps_.leaps_ahead(*newest_imu_, imu.utime))) {
+    newest_imu_ = imu.utime;
+  }
   entries_.push_back({.utime = imu.utime, .sequence = imu.sequence, .kind = Kind::kImu, .data = event.data});
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/leap_guard.h"
 #include "common/measurements.h"
 #include "common/trajectory_file.h"
 #include "ignis/lio_command_t.hpp"
@@ -89,7 +90,8 @@ class ReplayInput {
   LogInventory inventory_;
   std::vector<Entry> entries_;
   RecordedResults live_results_;
-  std::optional<Utime> newest_imu_;     // [us] of those that were indexed
+  std::optional<Utime> newest_imu_;  // [us] of those that were indexed, as the front end believes it
+  LeapGuard imu_leaps_;
   std::optional<Utime> newest_health_;  // [us] of the live front end, while it had lost nothing
   Trajectory ground_truth_;
 };

@@ -221,6 +221,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
   json["scans_with_unobserved_directions"] =
       std::ranges::count_if(result.scans, [](const ScanStats& scan) { return scan.degenerate_directions > 0; });
   json["sessions"] = result.sessions;
+  json["refused_commands"] = result.refused_commands;
   json["keyframes"] = result.smoother.keyframes;
   json["keyframes_retired"] = result.smoother.retired;
   json["keyframes_without_imu"] = result.smoother.without_imu;
@@ -381,9 +382,13 @@ std::string summary(const ReplaySource& source, const ReplayResult& result, cons
   text += std::format("\ngraph:      {} keyframes, {} loops kept, {} withdrawn", result.smoother.keyframes,
                       result.smoother.loops_kept, result.smoother.loops_withdrawn);
   if (result.sessions > 1)
-    text += std::format("; of the last of {} sessions, which begin where the map is lost", result.sessions);
+    text += std::format("; of the last of {} sessions, which begin where the map is lost or a command says so",
+                        result.sessions);
   text += '\n';
   if (const std::string refused = refusals(result); !refused.empty()) text += std::format("refused:    {}\n", refused);
+  for (const auto& [reason, count] : result.refused_commands) {
+    text += std::format("refused:    {} commands to the live front end: {}\n", count, reason);
+  }
   if (!result.solver_failure.empty()) text += std::format("graph ends: {}\n", result.solver_failure);
   text +=
       std::format("time:       {:.2f} s, {:.1f} times real time; a scan takes {:.2f} ms (median), {:.2f} ms (p99)\n",

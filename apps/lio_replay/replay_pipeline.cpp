@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "messages/lio_command.h"
+
 namespace ignis {
 namespace {
 
@@ -12,8 +14,9 @@ constexpr std::size_t kMostAhead = 128;
 
 }  // namespace
 
-ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener)
-    : lio_(config.frontend.filter), follower_(config, use_loops, listener), steps_(kMostAhead) {
+ReplayPipeline::ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener,
+                               std::int32_t session)
+    : lio_(config.frontend.filter, session), follower_(config, use_loops, listener, session), steps_(kMostAhead) {
   following_ = std::thread([this] { follow(); });
 }
 
@@ -32,7 +35,8 @@ void ReplayPipeline::add_scan(Scan scan) {
 }
 
 void ReplayPipeline::take_command(const lio_command_t& command) {
-  if (command.command == lio_command_t::BEGIN_ANEW) (void)lio_.begin_anew_after(command.utime, command.session);
+  const std::string refusal = messages::carry_out(command, lio_);
+  if (!refusal.empty()) ++refused_commands_[refusal];
 }
 
 void ReplayPipeline::hand_over(ScanResult scan, double milliseconds) {
@@ -61,6 +65,7 @@ ReplayResult ReplayPipeline::finish() {
   result.start = lio_.status().text;
   result.imu_samples = imu_samples_;
   result.rejected_imu = std::move(rejected_imu_);
+  result.refused_commands = std::move(refused_commands_);
   return result;
 }
 

@@ -16,8 +16,10 @@ namespace ignis {
 /// files are of the newest session, the trajectories of all.
 class ReplayPipeline {
  public:
-  /// `listener` may be null; it outlives the pipeline, and until finish() it is called in the other thread.
-  ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener = nullptr);
+  /// `listener` may be null; it outlives the pipeline, and until finish() it is called in the other thread. `session`
+  /// is the number of the first one.
+  ReplayPipeline(const runtime::IgnisConfig& config, bool use_loops, GraphListener* listener = nullptr,
+                 std::int32_t session = 0);
   ~ReplayPipeline();
   ReplayPipeline(const ReplayPipeline&) = delete;
   ReplayPipeline& operator=(const ReplayPipeline&) = delete;
@@ -26,7 +28,7 @@ class ReplayPipeline {
   void add_imu(const ImuSample& sample);
   void add_scan(Scan scan);
 
-  /// What the live front end refused is refused here as well.
+  /// What is refused is counted.
   void take_command(const lio_command_t& command);
 
   /// Places everything at its final pose. Call once, at the end. Throws what back end or map have thrown.
@@ -50,6 +52,7 @@ class ReplayPipeline {
   StageTimer frontend_timer_;
   std::int64_t imu_samples_ = 0;
   std::map<std::string, std::int64_t> rejected_imu_;
+  std::map<std::string, std::int64_t> refused_commands_;
   ReplayFollower follower_;
   BoundedQueue<Step> steps_;
   std::exception_ptr failure_;  // of the other thread, written before it closes the queue

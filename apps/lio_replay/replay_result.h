@@ -34,7 +34,8 @@ struct ReplayResult {
   int sessions = 1;       ///< the front end's; all above but the trajectories is of the newest
   std::string start;      ///< what the front end says about its start
   std::int64_t imu_samples = 0;
-  std::map<std::string, std::int64_t> rejected_imu;  ///< by reason
+  std::map<std::string, std::int64_t> rejected_imu;      ///< by reason
+  std::map<std::string, std::int64_t> refused_commands;  ///< to the live front end, by reason
   // Of all sessions: what graph and map did not take.
   int keyframes_refused = 0;      ///< by the graph
   std::string first_refusal;      ///< which keyframe, and why

@@ -38,7 +38,7 @@ struct ReceiverCounts {
   std::int64_t queue_drops = 0;  ///< skipped by this process because it was late
 };
 
-/// Whether the running numbers of a channel can be checked: several senders share HEALTH and KEYFRAME_REQUEST.
+/// Whether the running numbers of a channel can be checked: several senders share HEALTH, requests and commands.
 enum class Senders : std::uint8_t { kOne, kSeveral };
 
 /// A process's end of the bus: checked opening, subscriptions with their own queue capacity, length checks before any

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tells the running front end to begin a new session with an empty map, and waits until it has begun.
 
-The vehicle has to stand then, as at any start. The graph and the map begin anew with the first keyframe."""
+It waits for a start as configured, which means standing unless frontend.start is moving. Graph and map follow."""
 
 from __future__ import annotations
 
@@ -89,7 +89,10 @@ def main(arguments: list[str] | None = None) -> int:
         if front_end.session != ended:
             print(f"session {ended} has ended, {front_end.session} begins: {front_end.reason}")
             return 0
-    print(f"ignis reset: session {ended} goes on after {ANSWER_SECONDS:.0f} s", file=sys.stderr)
+    print(
+        f"ignis reset: session {ended} goes on after {ANSWER_SECONDS:.0f} s; the front end says: {front_end.reason}",
+        file=sys.stderr,
+    )
     return 1
 
 

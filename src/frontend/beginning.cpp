@@ -2,6 +2,7 @@
 //
 // How Lio begins: with what the IMU and the scans before it say of the motion, or with a velocity that is not known.
 #include <cmath>
+#include <format>
 
 #include "frontend/lio.h"
 #include "frontend/scan_instant.h"
@@ -33,8 +34,9 @@ double velocity_sigma(const FilterState& filter) {
 const char* Lio::begin_anew_after(Utime utime, std::int32_t session) {
   if (session != session_) return "it is not this session that is to end";
   if (imu_.empty()) return "no IMU data have come, so there is nothing to end";
+  if (session_end_ && session_end_->session == session) return "";
   const Utime lead = utime - imu_.newest();
-  if (lead < 0 || lead > kMostLeadUs) return "the stamp is not of the two seconds ahead";
+  if (lead < kHandOverUs || lead > kMostLeadUs) return "the stamp is not of the two seconds ahead";
   session_end_ = SessionEnd{session, utime};
   return "";
 }
@@ -43,17 +45,22 @@ bool Lio::ends_with(Utime sample) const {
   return session_end_ && session_end_->session == session_ && sample > session_end_->utime;
 }
 
-/// Scans that wait then end behind the last sample of the old session, and belong to the new one.
+/// Scans that wait keep waiting: each has one verdict, whichever session it falls to.
 void Lio::begin_anew() {
+  const SessionEnd end = *session_end_;
+  const std::optional<Utime> newest_scan = last_scan_end_;
   std::deque<Scan> waiting = std::move(pending_);
   reset();
+  session_end_ = end;
+  last_scan_end_ = newest_scan;
   pending_ = std::move(waiting);
-  start_note_ = "new session: a command said so";
+  start_note_ = std::format("new session: {} was ended by a command", end.session);
 }
 
 bool Lio::falls_to_ended_session(const Scan& scan) const {
-  return session_end_ && session_end_->session <= session_ && scan.end_utime() <= session_end_->utime &&
-         scan.end_utime() > session_end_->utime - kHandOverUs;
+  if (!session_end_ || scan.end_utime() > session_end_->utime) return false;
+  const bool has_ended = session_end_->session < session_;
+  return has_ended || scan.end_utime() > session_end_->utime - kHandOverUs;
 }
 
 ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
@@ -74,7 +81,7 @@ void Lio::start(const FilterState& first) {
   running_ = true;
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
-  if (!start_note_.empty()) trust_.note_uncertain_start("new session after a restart", kScansToConfirmSession);
+  if (!start_note_.empty()) trust_.note_uncertain_start("new session", kScansToConfirmSession);
   opinion_.begin(first.nominal.utime);
   drift_.begin(filter_);
 }

@@ -43,22 +43,27 @@ std::string read_whole(const RecordAt& record, auto& value) {
   return reader.failed() || !reader.at_end() ? "its contents are impossible" : "";
 }
 
-std::string refusal(const Head& head, const FrontendConfig& config, const std::string& config_hash) {
+std::string refusal(const Head& head, bool is_alone, const FrontendConfig& config, const std::string& config_hash) {
   if (head.version != kCheckpointVersion) {
     return std::format("it has version {}, this build writes {}", head.version, kCheckpointVersion);
   }
   if (head.config_hash != config_hash) return "it was written under another configuration";
   if (config.resume_max_gap_s <= 0.0) return "frontend.resume_max_gap_s is 0";
+  if (is_alone) return "its session has ended";
   return {};
 }
 
 }  // namespace
 
-std::vector<std::byte> encode_checkpoint(const Lio& lio, const std::string& config_hash) {
+std::vector<std::byte> encode_ended_session(std::int32_t session, const std::string& config_hash) {
   Head head;
   head.config_hash = config_hash;
-  head.session = lio.session();
-  std::vector<std::byte> bytes = record_of(head);
+  head.session = session;
+  return record_of(head);
+}
+
+std::vector<std::byte> encode_checkpoint(const Lio& lio, const std::string& config_hash) {
+  std::vector<std::byte> bytes = encode_ended_session(lio.session(), config_hash);
   const std::vector<std::byte> body =
       record_of(lio, kBytesBesideMap + kBytesPerMapPoint * static_cast<std::size_t>(lio.map().size()));
   bytes.insert(bytes.end(), body.begin(), body.end());
@@ -75,7 +80,7 @@ Lio start_from_checkpoint(const FrontendConfig& config, const std::string& confi
   if (!problem.empty() || head.session < 0 || head.session == std::numeric_limits<std::int32_t>::max()) {
     return Lio(config, 0, std::format("new session: the checkpoint is not used ({})", problem));
   }
-  problem = refusal(head, config, config_hash);
+  problem = refusal(head, bytes.size() == kRecordFrameBytes + first.payload.size(), config, config_hash);
   if (problem.empty()) {
     Lio lio(config);
     problem = read_whole(record_at(bytes, kRecordFrameBytes + first.payload.size()), lio);

@@ -23,6 +23,9 @@ inline constexpr std::uint32_t kCheckpointVersion = 12;
 /// Requires lio.can_be_resumed().
 [[nodiscard]] std::vector<std::byte> encode_checkpoint(const Lio& lio, const std::string& config_hash);
 
+/// Of a session that has ended, with nothing to go on from: a successor begins the next one.
+[[nodiscard]] std::vector<std::byte> encode_ended_session(std::int32_t session, const std::string& config_hash);
+
 /// A front end that goes on from a checkpoint or, when there is none or it is damaged, of another version or
 /// configuration, a new one that says why in start_note(). A new session has a number that the checkpoint's did not,
 /// as long as the head can be read. Any bytes at all; empty: there is no checkpoint.

@@ -70,6 +70,7 @@ void Lio::reset() {
   resumed_from_.reset();
   confirm_until_.reset();
   unaided_.reset();
+  session_end_.reset();
 }
 
 LioStatus Lio::status() const {
@@ -133,10 +134,6 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
                       (last_scan_end_ && scan.end_utime() <= *last_scan_end_) ||
                       (!imu_.empty() && scan.end_utime() > imu_.newest() + kMaxLeadUs);
   std::vector<ScanResult> results;
-  if (falls_to_ended_session(scan)) {
-    results.push_back(verdict_of_ended_session(scan));
-    return results;
-  }
   if (resumed_from_) {
     results.push_back(refuse(scan, ScanReason::kNoImu));
     return results;
@@ -171,7 +168,8 @@ std::vector<ScanResult> Lio::process_pending() {
     last_scan_end_.reset();
   }
   while (!pending_.empty() && !imu_.empty() && pending_.front().end_utime() <= imu_.newest()) {
-    results.push_back(process(pending_.front()));
+    const Scan& scan = pending_.front();
+    results.push_back(falls_to_ended_session(scan) ? verdict_of_ended_session(scan) : process(scan));
     pending_.pop_front();
   }
   if (running_ && !results.empty()) rebuild_live_state();
@@ -373,6 +371,7 @@ void Lio::begin_new_map() {
   contradictions_ = 0;
   scans_without_correction_ = 0;
   ++session_;
+  session_end_.reset();
   keyframer_ = Keyframer(config_, session_);
   trust_.note_loss();
   opinion_.forget();

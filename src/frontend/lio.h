@@ -67,10 +67,10 @@ class Lio {
   /// Forgets everything and starts a new session.
   void reset();
 
-  /// The same, by a command, with the first sample behind `utime`, which the new session does not use. Scans that end
-  /// in the 150 ms up to then are refused, so that it does not matter which of them come behind that sample. `session`
-  /// is the one that ends; the stamp lies ahead of the newest sample by two seconds at most. Why it cannot be; empty
-  /// when it will.
+  /// The same, by a command: `session` ends with the first sample behind `utime`, 0.15 to 2 s ahead of the newest one;
+  /// the next session begins with the sample after that. Scans that end in the 0.15 s up to `utime`, and older ones
+  /// that come when it has passed, are refused, so that it does not matter which of them come late. A second command
+  /// while one is pending changes nothing. Why it cannot be; empty when it will.
   [[nodiscard]] const char* begin_anew_after(Utime utime, std::int32_t session);
 
   /// After its state has been read back from bytes (see checkpoint.h): speed and turn rate go on over the time since
@@ -135,10 +135,10 @@ class Lio {
   void rebuild_live_state();
   [[nodiscard]] double noise_scale(std::size_t sample_after) const;
 
-  /// A command said so.
+  /// By a command.
   struct SessionEnd {
     std::int32_t session = 0;
-    Utime utime = 0;  ///< the first sample behind it begins the next one
+    Utime utime = 0;  ///< the first sample behind it is the last one
   };
 
   static constexpr int kScansUntilReacquisition = 5;  ///< without a correction

@@ -37,10 +37,10 @@ Drive later(Drive input, Utime by) {
 TEST(BeginAnew, EndsTheSessionWithTheFirstSampleBehindTheStampAndKeepsNothing) {
   const Utime last = drive().imu.back().utime;
   // It stands again, elsewhere.
-  const Drive second = later(drive(), last - drive().imu.front().utime + 4'000);
+  const Drive second = later(drive(), last - drive().imu.front().utime + 152'000);
   Lio lio(test::tuned_config());
   (void)feed(lio, drive());
-  ASSERT_STREQ(lio.begin_anew_after(last, 0), "");
+  ASSERT_STREQ(lio.begin_anew_after(last + 150'000, 0), "");
   EXPECT_EQ(lio.session(), 0) << "its time has not come";
   const std::vector<ScanResult> results = feed(lio, second);
   EXPECT_EQ(lio.session(), 1);
@@ -49,12 +49,16 @@ TEST(BeginAnew, EndsTheSessionWithTheFirstSampleBehindTheStampAndKeepsNothing) {
   // The sample that ended the session is not part of the next one.
   Drive rest = second;
   rest.imu.erase(rest.imu.begin());
-  Lio fresh(test::tuned_config(), 1);
+  Lio fresh(test::tuned_config(), 1, "new session");
   const std::vector<ScanResult> expected = feed(fresh, rest);
   ASSERT_EQ(results.size(), expected.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
     EXPECT_EQ(results[i].stats.session, 1);
     EXPECT_EQ(results[i].state.T_odom_body.translation, expected[i].state.T_odom_body.translation) << i;
+    EXPECT_EQ(results[i].state.T_odom_body.rotation.coeffs(), expected[i].state.T_odom_body.rotation.coeffs()) << i;
+    EXPECT_EQ(results[i].state.gyro_bias, expected[i].state.gyro_bias) << i;
+    EXPECT_EQ(results[i].covariance, expected[i].covariance) << i;
+    EXPECT_EQ(results[i].trust, expected[i].trust) << i;
     EXPECT_EQ(results[i].stats.map_points, expected[i].stats.map_points) << i;
     ASSERT_EQ(results[i].keyframe.has_value(), expected[i].keyframe.has_value()) << i;
     if (results[i].keyframe) {
@@ -63,43 +67,57 @@ TEST(BeginAnew, EndsTheSessionWithTheFirstSampleBehindTheStampAndKeepsNothing) {
   }
 }
 
-TEST(BeginAnew, AScanAtTheEndHasTheSameVerdictWhicheverCameFirst) {
+/// Verdicts on three scans: of the end, behind it, and of the start of the next session.
+std::vector<ScanStats> verdicts_around_the_end(Utime lateness) {
   const Utime last = drive().imu.back().utime;
-  const Utime due = last + 60'000;
-  const auto verdicts = [&](bool scans_come_late) {
-    Lio lio(test::tuned_config());
-    (void)feed(lio, drive());
-    EXPECT_STREQ(lio.begin_anew_after(due, 0), "");
-    std::vector<ScanStats> stats;
-    const auto take = [&](const std::vector<ScanResult>& results) {
-      for (const ScanResult& each : results) stats.push_back(each.stats);
-    };
-    const auto sample_at = [&](Utime utime) {
-      ImuSample sample = drive().imu.front();
-      sample.utime = utime;
-      take(lio.add_imu(sample).scans);
-    };
-    const auto scan_until = [&](Utime end) {
-      take(lio.add_scan({.utime = end - 40'000, .duration_us = 40'000, .points = drive().scans.back().points}));
-    };
-    for (Utime utime = last + 4'000; utime <= due; utime += 4'000) sample_at(utime);
-    if (scans_come_late) sample_at(due + 4'000);
-    scan_until(due - 20'000);  // before the end
-    scan_until(due + 2'000);   // behind it
-    if (!scans_come_late) sample_at(due + 4'000);
-    for (Utime utime = due + 8'000; utime <= due + 40'000; utime += 4'000) sample_at(utime);
-    EXPECT_EQ(lio.session(), 1);
-    EXPECT_NE(lio.status().reason.find("a command said so"), std::string::npos);
-    return stats;
+  const Utime due = last + 200'000;
+  const std::vector<Utime> ends{due - 20'000, due + 2'000, due + 60'000};
+  Lio lio(test::tuned_config());
+  (void)feed(lio, drive());
+  std::vector<ScanStats> stats;
+  const auto take = [&](const std::vector<ScanResult>& results) {
+    for (const ScanResult& each : results) stats.push_back(each.stats);
   };
-  for (const bool scans_come_late : {false, true}) {
-    const std::vector<ScanStats> stats = verdicts(scans_come_late);
-    ASSERT_EQ(stats.size(), 2U) << scans_come_late;
-    EXPECT_EQ(stats[0].reason, ScanReason::kSessionEnded);
-    EXPECT_EQ(stats[0].session, 0);
-    EXPECT_EQ(stats[1].reason, ScanReason::kNotInitialised);
-    EXPECT_EQ(stats[1].session, 1);
+  auto end = ends.begin();
+  for (Utime utime = last; utime <= due + 500'000; utime += 4'000) {
+    for (; end != ends.end() && *end + lateness <= utime; ++end) {
+      take(lio.add_scan({.utime = *end - 40'000, .duration_us = 40'000, .points = drive().scans.back().points}));
+    }
+    if (utime == last) {
+      EXPECT_STREQ(lio.begin_anew_after(due, 0), "");
+      continue;
+    }
+    ImuSample sample = drive().imu.front();
+    sample.utime = utime;
+    take(lio.add_imu(sample).scans);
   }
+  EXPECT_EQ(lio.session(), 1);
+  return stats;
+}
+
+TEST(BeginAnew, AScanAtTheEndHasTheSameVerdictWhetherItComesEarlyOrLate) {
+  for (const Utime lateness : {-200'000, -30'000, 0, 6'000, 30'000, 400'000}) {
+    const std::vector<ScanStats> stats = verdicts_around_the_end(lateness);
+    ASSERT_EQ(stats.size(), 3U) << lateness;
+    EXPECT_EQ(stats[0].reason, ScanReason::kSessionEnded) << lateness;
+    EXPECT_EQ(stats[0].session, 0) << lateness;
+    for (const std::size_t i : {1U, 2U}) {
+      EXPECT_EQ(stats[i].reason, ScanReason::kNotInitialised) << lateness;
+      EXPECT_EQ(stats[i].session, 1) << lateness;
+    }
+  }
+}
+
+TEST(BeginAnew, ASecondCommandDoesNotPostponeTheFirst) {
+  Lio lio(test::tuned_config());
+  (void)feed(lio, drive());
+  const Utime last = drive().imu.back().utime;
+  EXPECT_STREQ(lio.begin_anew_after(last + 200'000, 0), "");
+  EXPECT_STREQ(lio.begin_anew_after(last + 1'900'000, 0), "");
+  ImuSample sample = drive().imu.front();
+  for (sample.utime = last + 4'000; sample.utime <= last + 300'000; sample.utime += 4'000) (void)lio.add_imu(sample);
+  EXPECT_EQ(lio.session(), 1);
+  EXPECT_NE(lio.status().reason.find("0 was ended by a command"), std::string::npos);
 }
 
 TEST(BeginAnew, IsRefusedForAnotherSessionAndAStampThatIsNotAhead) {
@@ -108,7 +126,7 @@ TEST(BeginAnew, IsRefusedForAnotherSessionAndAStampThatIsNotAhead) {
   (void)feed(lio, drive());
   const Utime last = drive().imu.back().utime;
   EXPECT_STRNE(lio.begin_anew_after(last + 300'000, 1), "");
-  EXPECT_STRNE(lio.begin_anew_after(last - 1, 0), "");
+  EXPECT_STRNE(lio.begin_anew_after(last + 149'000, 0), "") << "scans of that time may have had their verdict";
   EXPECT_STRNE(lio.begin_anew_after(last + 2'000'001, 0), "");
   (void)feed(lio, later(drive(), 2'100'000 + last - drive().imu.front().utime));
   EXPECT_EQ(lio.session(), 0);

@@ -79,6 +79,12 @@ std::vector<std::byte> bytes_of(const auto& value) {
   return bytes;
 }
 
+TEST(Checkpoint, OfASessionThatHasEndedLeavesItsNumberAlone) {
+  const Lio after = start_from_checkpoint(test::tuned_config(), "hash", encode_ended_session(4, "hash"));
+  EXPECT_EQ(after.session(), 5);
+  EXPECT_NE(after.start_note().find("its session has ended"), std::string::npos);
+}
+
 TEST(Checkpoint, AFrontEndThatWasReadBackGoesOnBitForBit) {
   for (const double at : {6.003, 9.502, 13.331}) {
     Lio original = driven_until(at);

@@ -350,7 +350,9 @@ TEST(ScanStats, ReasonsEqualTheConstantsOfTheMessage) {
       {"MAP_EMPTY", ScanReason::kMapEmpty},
       {"BAD_STAMP", ScanReason::kBadStamp},
       {"NO_IMU", ScanReason::kNoImu},
-      {"NUMERICAL_FAILURE", ScanReason::kNumericalFailure}};
+      {"NUMERICAL_FAILURE", ScanReason::kNumericalFailure},
+      {"TOO_OFTEN", ScanReason::kTooOften},
+      {"SESSION_ENDED", ScanReason::kSessionEnded}};
   for (const auto& [name, reason] : expected) {
     EXPECT_NE(lcm.find(" " + name + " = " + std::to_string(static_cast<int>(reason))), std::string::npos) << name;
     EXPECT_NE(text(reason), "unknown reason");

@@ -61,6 +61,7 @@ class LiveRun : public GraphListener {
             .revisions = {revisions.begin(), revisions.end()},
             .smoothed_states = {smoothed_states.begin(), smoothed_states.end()},
             .loops = {loops.begin(), loops.end()},
+            .first_session = {},
             .first_command = {}};
   }
 

@@ -99,6 +99,7 @@ TEST_F(ReplayInputTest, HandsOutACommandBehindTheNewestSampleThatWasRecordedBefo
   command.utime = 1'000'000;
   write_message("LIO_COMMAND", command);  // nothing had begun that could end
   for (const int i : {0, 1, 3, 2}) write_imu(i);
+  write_imu(500'000);  // a stamp of the far future
   write_message("LIO_COMMAND", command);
   for (const int i : {4, 5}) write_imu(i);
   write_scan(0);
@@ -108,7 +109,7 @@ TEST_F(ReplayInputTest, HandsOutACommandBehindTheNewestSampleThatWasRecordedBefo
              .on_scan = [](const Scan&) {},
              .on_command = [&](const lio_command_t& heard) { stamps.push_back(heard.utime); },
              .proceed = [](Utime) { return true; }});
-  EXPECT_EQ(stamps, (std::vector<Utime>{0, 4'000, 8'000, 12'000, 1'000'000, 16'000, 20'000}));
+  EXPECT_EQ(stamps, (std::vector<Utime>{0, 4'000, 8'000, 12'000, 1'000'000, 16'000, 20'000, 2'000'000'000}));
 }
 
 TEST_F(ReplayInputTest, NamesTheFirstOfAllGaps) {

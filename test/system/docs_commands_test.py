@@ -28,6 +28,7 @@ NOT_RUN = {
     r"ignis spy": "a window; vehicle_spy_test opens it",
     r"ignis (demo|build|test|lint|fuzz|sanitize|evaluate)\b": "minutes; CI runs it",
     r"ignis format": "changes the checkout",
+    r"ignis reset": "ends the session under the other commands; reset_test runs it",
     r"ignis shell( +#|$)": "a shell for people",
     r"packaging/|vehicle_cost": "minutes, and needs root or the package",
     r"ignis bench|bench/|soak\.py": "minutes to an hour",

@@ -20,7 +20,7 @@ CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
 SCENE = CHECKOUT / "config" / "scenes" / "battery_hall_quick.json"
 PORT = 18097
-REST_SECONDS, DRIVE_SECONDS = 9, 8.0
+REST_SECONDS, DRIVE_SECONDS = 12, 8.0
 
 
 class Listener:
@@ -29,6 +29,7 @@ class Listener:
     def __init__(self, bus: Bus) -> None:
         self.states: list[tuple[int, int]] = []  # session and stamp
         self.graph_session = -1
+        self.map_resets = 0
         self.front_end_text = ""
         self._bus = bus
         bus.subscribe("LIO_STATE", self._on_state).set_queue_capacity(5000)
@@ -46,6 +47,8 @@ class Listener:
         health = health_t.decode(data)
         if health.process == "lio_frontend":
             self.front_end_text = health.state_text
+        elif health.process == "map_builder":
+            self.map_resets = health.resets
 
     def until(self, condition: Any, seconds: float) -> None:
         """Listens until something is so."""
@@ -61,7 +64,7 @@ def resetting(pipeline: Pipeline, *arguments: str) -> subprocess.CompletedProces
 
 
 def scene_that_rests(folder: Path) -> Path:
-    """Long enough for two starts."""
+    """Long enough for three starts."""
     scene = json.loads(SCENE.read_text())
     scene["geometry"] = str(SCENE.parent / scene["geometry"])
     scene["trajectory"]["waypoints"][0]["rest_s"] = REST_SECONDS
@@ -90,8 +93,9 @@ def test_a_reset_begins_a_new_session_everywhere_and_is_replayed(
 
         done = resetting(pipeline)
         assert done.returncode == 0, done.stderr
-        assert "session 0 has ended, 1 begins: new session: a command said so" in done.stdout
+        assert "session 0 has ended, 1 begins: new session: 0 was ended by a command" in done.stdout
         listener.until(lambda: listener.states[-1][0] == 1 and listener.graph_session == 1, 10.0)
+        listener.until(lambda: listener.map_resets == 1, 3.0)
         time.sleep(DRIVE_SECONDS)
         pipeline.check("l1_sim", "l1_driver")
         pipeline.stop("l1_sim", "l1_driver", "lio_frontend", "graph_backend", "map_builder", "lcm-logger")
@@ -104,10 +108,33 @@ def test_a_reset_begins_a_new_session_everywhere_and_is_replayed(
     run_binary("lio_replay", log, *config, "--out", tmp_path / "replay")
     report = json.loads((tmp_path / "replay" / "report.json").read_text())
     assert report["live"]["recorded_scans"] > 100
+    assert report["sessions"] == 2 and not report["refused_commands"]
     require_equal_up_to_the_first_drop(report)
     with (tmp_path / "replay" / "scan_stats.csv").open() as file:
         reasons = file.read()
     assert reasons.count("not initialised yet") > 50, "two starts of 1.5 s at 20 Hz"
+
+
+def test_a_front_end_that_is_killed_before_the_new_session_has_started_begins_one_more(
+    private_network: None, tmp_path: Path
+) -> None:
+    config = ("--config", CONFIG)
+    url = effective_config(CONFIG)["lcm"]["url"]
+    tty = tmp_path / "l1.pty"
+    front_end = ("lio_frontend", *config, "--checkpoint", tmp_path / "checkpoint")
+    with Pipeline(tmp_path, url) as pipeline:
+        listener = Listener(open_bus(url))
+        pipeline.start(*front_end)
+        pipeline.start("l1_sim", "--scene", scene_that_rests(tmp_path), *config, "--pty", tty, "--wait", 20)
+        pipeline.wait_for_text("l1_sim", "waiting", 10.0)
+        pipeline.start("l1_driver", *config, "--port", tty)
+        listener.until(lambda: len(listener.states) > 250, 20.0)
+        assert resetting(pipeline).returncode == 0
+        pipeline.processes["lio_frontend"].kill()
+        pipeline.processes["lio_frontend"].wait()
+        pipeline.start(*front_end)
+        listener.until(lambda: listener.states[-1][0] == 2, 10.0)
+    assert {session for session, _ in listener.states} == {0, 2}
 
 
 def test_a_reset_without_a_front_end_says_what_is_missing(
