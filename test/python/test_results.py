@@ -128,7 +128,7 @@ def test_a_recorded_run_becomes_a_results_folder(tmp_path: Path) -> None:
     np.testing.assert_allclose(corrected.poses.position[:, 2], expected, atol=1e-9)
     np.testing.assert_allclose(truth.poses.position, [[i, 1.0, 0.0] for i in range(1, 11)], atol=1e-9)
     assert (said["scans"], said["applied"], said["sessions"]) == (13, 9, 2)
-    assert said["rejected"] == {"not_initialised": 1, "too_few_matches": 2}
+    assert said["rejected"] == {"not_initialised": 1, "session_ended": 1, "too_few_matches": 2}
     assert said["lost"] == 5
     assert said["receivers"]["graph_backend"]["LIO_STATE"]["lost"] == 3
     assert said["voxels"] == {"local": 3, "mid": 2, "coarse": 1}
