@@ -64,7 +64,10 @@ void LapSource::run(double seconds, const std::function<void(const ImuSample&)>&
       each.utime += shift;
       on_scan(std::move(each));
     };
-    input_.run(imu, scan, [&](Utime utime) { return utime < end_ && utime + shift < until && proceed(); });
+    input_.run({.on_imu = imu,
+                .on_scan = scan,
+                .on_command = [](const lio_command_t&) {},  // a lap is of one session
+                .proceed = [&](Utime utime) { return utime < end_ && utime + shift < until && proceed(); }});
   }
 }
 

@@ -133,7 +133,7 @@ def test_a_recorded_run_becomes_a_results_folder(tmp_path: Path) -> None:
     assert said["receivers"]["graph_backend"]["LIO_STATE"]["lost"] == 3
     assert said["voxels"] == {"local": 3, "mid": 2, "coarse": 1}
     assert said["loops"] == {"accepted": 1, "by_reason": {"accepted": 1}}
-    assert said["time_per_scan_ms"]["median"] == 7.5
+    assert said["time_per_scan_ms"]["median"] == 8.0
 
 
 def test_tables_have_one_row_per_message_and_one_column_per_number(tmp_path: Path) -> None:
