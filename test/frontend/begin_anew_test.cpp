@@ -108,6 +108,22 @@ TEST(BeginAnew, AScanAtTheEndHasTheSameVerdictWhetherItComesEarlyOrLate) {
   }
 }
 
+TEST(BeginAnew, AScanThatWaitedIsNotTakenTwice) {
+  Lio lio(test::tuned_config());
+  (void)feed(lio, drive());
+  const Utime due = drive().imu.back().utime + 200'000;
+  ASSERT_STREQ(lio.begin_anew_after(due, 0), "");
+  ImuSample sample = drive().imu.front();
+  for (sample.utime = due - 196'000; sample.utime <= due; sample.utime += 4'000) (void)lio.add_imu(sample);
+  const Scan scan{.utime = due - 38'000, .duration_us = 40'000, .points = drive().scans.back().points};
+  EXPECT_TRUE(lio.add_scan(scan).empty()) << "it waits";
+  (void)lio.add_imu(sample);
+  ASSERT_EQ(lio.session(), 1);
+  const std::vector<ScanResult> again = lio.add_scan(scan);
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(again[0].stats.reason, ScanReason::kBadStamp);
+}
+
 TEST(BeginAnew, ASecondCommandDoesNotPostponeTheFirst) {
   Lio lio(test::tuned_config());
   (void)feed(lio, drive());
