@@ -14,6 +14,7 @@
 #include "graph_agreement.h"
 #include "replay_output.h"
 #include "replay_progress.h"
+#include "replay_summary.h"
 #include "replay_verdict.h"
 #include "runtime/stop_signal.h"
 

@@ -32,9 +32,6 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const r
                                     const ReplaySource& source, const ReplayPipeline& pipeline,
                                     const ReplayResult& result, const ReplayTiming& timing);
 
-/// What a person wants to know, in a few lines.
-[[nodiscard]] std::string summary(const ReplaySource& source, const ReplayResult& result, const ReplayTiming& timing);
-
 /// Fingerprint of both trajectories: equal for two replays of one log with one build.
 [[nodiscard]] std::string trajectory_hash(const ReplayResult& result);
 

@@ -47,6 +47,13 @@ class Bus(lcm.LCM):
         self._handlers.append(handler)
         return super().subscribe(channel, weakref.proxy(handler))
 
+    def wait_until(self, condition: Callable[[], bool], seconds: float) -> bool:
+        """Handles what arrives until something is so, or the time is over; whether it is."""
+        deadline = time.monotonic() + seconds
+        while not condition() and time.monotonic() < deadline:
+            self.handle_timeout(50)
+        return condition()
+
 
 def open_bus(url: str) -> Bus:
     """The bus; an InputError that says what to do when it cannot be opened."""

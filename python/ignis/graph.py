@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import time
 
 from ignis_lcm.ignis import graph_command_t, loop_result_t, smoothed_keyframes_t
 
@@ -92,10 +91,7 @@ def main(arguments: list[str] | None = None) -> int:
     for attempt in range(ATTEMPTS):
         command.sequence = attempt
         bus.publish("GRAPH_COMMAND", command.encode())
-        deadline = time.monotonic() + ANSWER_SECONDS / ATTEMPTS
-        while not answer.text and time.monotonic() < deadline:
-            bus.handle_timeout(50)
-        if answer.text:
+        if bus.wait_until(lambda: bool(answer.text), ANSWER_SECONDS / ATTEMPTS):
             print(answer.text)
             return 0
     print(

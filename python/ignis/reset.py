@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import time
 
 from ignis_lcm.ignis import health_t, imu_t, lio_command_t
 
@@ -73,20 +72,14 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"ignis reset: {error}", file=sys.stderr)
         return 1
     front_end = FrontEnd(bus)
-    deadline = time.monotonic() + ANSWER_SECONDS
-    while not front_end.is_known and time.monotonic() < deadline:
-        bus.handle_timeout(50)
-    if not front_end.is_known:
+    if not bus.wait_until(lambda: front_end.is_known, ANSWER_SECONDS):
         print(f"ignis reset: nothing was heard of {front_end.missing} on {options.lcm_url}", file=sys.stderr)
         return 1
     ended = front_end.session
     # A datagram may be lost; the session's number keeps a second one from ending the next session.
     for attempt in range(_ATTEMPTS):
         bus.publish("LIO_COMMAND", command_for(front_end, attempt).encode())
-        deadline = time.monotonic() + ANSWER_SECONDS / _ATTEMPTS
-        while front_end.session == ended and time.monotonic() < deadline:
-            bus.handle_timeout(50)
-        if front_end.session != ended:
+        if bus.wait_until(lambda: front_end.session != ended, ANSWER_SECONDS / _ATTEMPTS):
             print(f"session {ended} has ended, {front_end.session} begins: {front_end.reason}")
             return 0
     print(
