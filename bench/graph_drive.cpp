@@ -81,8 +81,9 @@ class Drive {
     write_tum(folder / "eskf.tum", odometry_);
     Trajectory smoothed;
     Trajectory distributed;
+    const std::vector<KeyframePose> poses = smoother_.all_poses();
     for (std::size_t i = 0; i < stamps_.size(); ++i) {
-      smoothed.push_back({stamps_[i], smoother_.all_poses()[i].T_map_body});
+      smoothed.push_back({stamps_[i], poses[i].T_map_body});
       distributed.push_back({stamps_[i], distributed_.poses()[i]});
     }
     write_tum(folder / "smoothed.tum", smoothed);

@@ -19,6 +19,7 @@ std::string remark_on(const SmootherStats& graph) {
   if (graph.retired > 0) {
     remark += std::format("; the oldest {} of {} keyframes have retired", graph.retired, graph.keyframes);
   }
+  if (graph.absorbed > 0) remark += std::format(", others stand for {} of them", graph.absorbed);
   return remark;
 }
 

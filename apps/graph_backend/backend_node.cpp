@@ -64,7 +64,7 @@ void BackendNode::spin_once() {
   link_.handle(kPollMs);
   request_missing_keyframes();
   graph_.maintain();
-  const bool has_keyframes = !graph_.smoother().all_poses().empty();
+  const bool has_keyframes = graph_.smoother().stats().keyframes > 0;
   if (has_keyframes && std::chrono::steady_clock::now() - last_full_ > kFullPeriod) publish_full_set();
   publish_health();
 }

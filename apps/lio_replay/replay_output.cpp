@@ -203,6 +203,7 @@ Json report(const runtime::Application& application, const ReplaySource& source,
   json["refused_commands"] = result.refused_commands;
   json["keyframes"] = result.smoother.keyframes;
   json["keyframes_retired"] = result.smoother.retired;
+  json["keyframes_absorbed"] = result.smoother.absorbed;
   json["keyframes_without_imu"] = result.smoother.without_imu;
   json["keyframes_refused"] = result.keyframes_refused;
   json["map_refusals"] = result.map_refusals;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "backend/graph_change.h"
+#include "backend/place_list.h"
 
 namespace ignis {
 
@@ -20,6 +21,18 @@ void CloudStore::add(std::int32_t keyframe, CompactCloud cloud) {
 
 void CloudStore::note_record(std::size_t number) {
   for (; recorded_ < entries_.size(); ++recorded_) entries_[recorded_].record = number;
+}
+
+void CloudStore::erase(std::span<const std::size_t> indices) {
+  for (const std::size_t index : indices) {
+    if (entries_[index].cloud) bytes_ -= entries_[index].cloud->bytes();
+  }
+  recorded_ -= static_cast<std::size_t>(std::ranges::lower_bound(indices, recorded_) - indices.begin());
+  erase_places(entries_, indices);
+  by_use_.clear();
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (entries_[i].cloud) by_use_[entries_[i].used] = i;
+  }
 }
 
 CloudLookup CloudStore::find(std::size_t index) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,13 @@ class CloudStore {
   /// The clouds added since the last call are in the archive's record of this number.
   void note_record(std::size_t number);
 
-  /// Of the `index`-th keyframe that was added.
+  /// How many of the first entries such a record is known of.
+  [[nodiscard]] std::size_t recorded() const { return recorded_; }
+
+  /// Lets go of entries for good: their indices, ascending. Those behind move up.
+  void erase(std::span<const std::size_t> indices);
+
+  /// Of the `index`-th keyframe in the store.
   [[nodiscard]] CloudLookup find(std::size_t index);
 
   /// The same without looking into the archive; null when it is not in memory.

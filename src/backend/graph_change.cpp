@@ -4,8 +4,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <format>
+#include <functional>
 #include <utility>
 
+#include "backend/keyframe_thinning.h"
+#include "backend/place_list.h"
 #include "common/byte_codec.h"
 #include "common/measurement_bytes.h"
 
@@ -89,6 +92,7 @@ void transfer(auto& io, FieldsOf<SmootherState> auto& state) {
   io.number(state.last_loop_id);
   io.number(state.next_loop_number);
   io.number(state.revision);
+  io.number(state.absorbed_loops);
 }
 
 void transfer(auto& io, FieldsOf<LinearisationPoint> auto& point) {
@@ -102,6 +106,7 @@ void transfer(auto& io, FieldsOf<LinearisationPoint> auto& point) {
 void transfer(auto& io, FieldsOf<GraphChange> auto& change) {
   transfer(io, change.state);
   io.maybe(change.retired);
+  io.list(change.absorbed);
   io.list(change.clouds);
   transfer(io, change.loops);
   transfer(io, change.waiting);
@@ -118,6 +123,7 @@ void copy_scalars(const SmootherState& from, SmootherState& to) {
   to.last_loop_id = from.last_loop_id;
   to.next_loop_number = from.next_loop_number;
   to.revision = from.revision;
+  to.absorbed_loops = from.absorbed_loops;
 }
 
 std::size_t index_of(const std::vector<GraphNode>& nodes, std::int32_t id) {
@@ -197,6 +203,30 @@ std::string retirement_problem(const SmootherState& state, const GraphChange& ch
   return is_known ? "" : "the motion of the newest keyframe that has retired is not known";
 }
 
+/// Why these keyframes cannot have been absorbed, or nothing; the new nodes are among `state`'s.
+std::string absorption_problem(const SmootherState& state, const GraphChange& change) {
+  const std::size_t retired = change.retired ? change.retired->count() : state.retired.count();
+  const auto is_absorbed = [&](std::int32_t id) { return std::ranges::binary_search(change.absorbed, id); };
+  if (std::ranges::adjacent_find(change.absorbed, std::greater_equal()) != change.absorbed.end())
+    return "keyframes that were absorbed are not in order";
+  for (const std::int32_t id : change.absorbed) {
+    if (index_of(state.nodes, id) + 1 >= retired) return std::format("keyframe {} was absorbed before its time", id);
+  }
+  for (const auto& [list, change_of_list] :
+       {std::pair(&state.loops, &change.loops), std::pair(&state.waiting, &change.waiting)}) {
+    const auto ends_there = [&](const GraphLoop& loop) {
+      return is_absorbed(loop.result.from_id) || is_absorbed(loop.result.to_id);
+    };
+    const auto stays = [&](const GraphLoop& loop) {
+      return ends_there(loop) && !std::ranges::contains(change_of_list->removed, loop.number);
+    };
+    if (std::ranges::any_of(*list, stays) || std::ranges::any_of(change_of_list->altered, ends_there) ||
+        std::ranges::any_of(change_of_list->appended, ends_there))
+      return "a loop ends at a keyframe that was absorbed";
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<std::byte> encode_change(const GraphChange& change) { return to_bytes(change); }
@@ -210,6 +240,7 @@ std::string RestoredGraph::apply(GraphChange change) {
   std::ranges::move(change.state.nodes, std::back_inserter(state.nodes));
   std::string problem = reference_problem(state, known, change);
   if (problem.empty()) problem = retirement_problem(state, change);
+  if (problem.empty()) problem = absorption_problem(state, change);
   if (!problem.empty()) {
     state.nodes.resize(known);
     return problem;
@@ -228,25 +259,55 @@ std::string RestoredGraph::apply(GraphChange change) {
     std::ranges::move(change.retired->blocks, std::back_inserter(state.retired.blocks));
     state.retired.newest_motion = change.retired->newest_motion;
   }
-  copy_scalars(change.state, state);
   std::ranges::move(change.state.links, std::back_inserter(state.links));
   while (state.links.size() > state.nodes.size() - state.retired.count()) state.links.pop_front();
+  follow_nodes(state, config);
+  let_go(change.absorbed);
+  copy_scalars(change.state, state);  // with the loops that went
   return {};
+}
+
+void RestoredGraph::let_go(std::span<const std::int32_t> absorbed) {
+  std::vector<std::size_t> places;
+  for (const std::int32_t id : absorbed) {
+    places.push_back(index_of(state.nodes, id));
+    state.absorbed.push_back({id, linearised[places.back()].state.T_odom_body});
+  }
+  absorb(places, state);
+  erase_places(linearised, places);
 }
 
 ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph()) {}
 
 ChangeTracker::ChangeTracker(const RestoredGraph& known)
     : nodes_(known.state.nodes.size()),
-      retired_blocks_(known.state.retired.blocks.size()),
-      retired_loops_(known.state.retired.loops.size()),
+      retired_(known.state.retired.count()),
+      absorbed_(known.state.absorbed.size()),
       vetoes_(known.state.vetoes.size()) {
   static_cast<void>(loops_.next(known.state.loops));
   static_cast<void>(waiting_.next(known.state.waiting));
 }
 
+/// What has retired beyond the first `retired_`, as it was before the newest `absorbed` were absorbed.
+RetiredKeyframes ChangeTracker::newly_retired(const SmootherState& state, std::size_t absorbed) const {
+  RetiredKeyframes news;
+  news.newest_motion = state.retired.newest_motion;
+  for (const RetiredBlock& block : state.retired.blocks) {
+    if (block.until > retired_) news.blocks.push_back({block.until + absorbed, block.covariance});
+  }
+  for (const GraphLoop& loop : state.retired.loops) {
+    const bool is_new = state.place_of(std::max(loop.result.from_id, loop.result.to_id)) >= retired_;
+    if (is_new) news.loops.push_back(loop);
+  }
+  return news;
+}
+
 GraphChange ChangeTracker::next(const SmootherState& state, std::vector<LinearisationPoint> linearised) {
   GraphChange change;
+  for (; absorbed_ < state.absorbed.size(); ++absorbed_) change.absorbed.push_back(state.absorbed[absorbed_].id);
+  // All of them had retired before.
+  nodes_ -= change.absorbed.size();
+  retired_ -= change.absorbed.size();
   change.state.nodes.assign(state.nodes.begin() + static_cast<std::ptrdiff_t>(nodes_), state.nodes.end());
   for (std::size_t i = nodes_; i < state.nodes.size(); ++i) {
     const CompactCloud* cloud = state.clouds.in_memory(i);
@@ -255,16 +316,8 @@ GraphChange ChangeTracker::next(const SmootherState& state, std::vector<Linearis
   const auto linked = std::min(std::ssize(state.links), std::ssize(state.nodes) - static_cast<std::ptrdiff_t>(nodes_));
   change.state.links.assign(state.links.end() - linked, state.links.end());
   nodes_ = state.nodes.size();
-  const RetiredKeyframes& retired = state.retired;
-  if (retired.blocks.size() > retired_blocks_) {
-    change.retired = {
-        {retired.blocks.begin() + static_cast<std::ptrdiff_t>(retired_blocks_), retired.blocks.end()},
-        retired.newest_motion,
-        {retired.loops.begin() + static_cast<std::ptrdiff_t>(retired_loops_), retired.loops.end()},
-    };
-  }
-  retired_blocks_ = retired.blocks.size();
-  retired_loops_ = retired.loops.size();
+  if (state.retired.count() > retired_) change.retired = newly_retired(state, change.absorbed.size());
+  retired_ = state.retired.count();
   change.state.vetoes.assign(state.vetoes.begin() + static_cast<std::ptrdiff_t>(vetoes_), state.vetoes.end());
   vetoes_ = state.vetoes.size();
   copy_scalars(state, change.state);

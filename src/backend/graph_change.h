@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "backend/loop_list_change.h"
@@ -26,6 +27,7 @@ struct GraphChange {
   /// loops.
   SmootherState state;
   std::optional<RetiredKeyframes> retired;     ///< if more have; blocks and loops: the new ones
+  std::vector<std::int32_t> absorbed;          ///< ids of keyframes that were absorbed after that, ascending
   std::vector<CompactCloud> clouds;            ///< one per new node
   LoopListChange loops;                        ///< those in the graph
   LoopListChange waiting;                      ///< those outside of it
@@ -40,12 +42,18 @@ struct GraphChange {
 /// State and linearisation points by node (of those that have retired: where they stay), as the changes so far leave
 /// them.
 struct RestoredGraph {
+  explicit RestoredGraph(BackendConfig how = {}) : config(std::move(how)) {}
+
+  BackendConfig config;
   SmootherState state;
   std::vector<LinearisationPoint> linearised;
   std::size_t changes = 0;  ///< applied so far: the number of the next one's record
 
   /// The reason why `change` cannot follow, and then nothing is altered; empty when it was applied.
   [[nodiscard]] std::string apply(GraphChange change);
+
+ private:
+  void let_go(std::span<const std::int32_t> absorbed);
 };
 
 /// Finds what changed since it looked last.
@@ -60,9 +68,11 @@ class ChangeTracker {
   [[nodiscard]] GraphChange next(const SmootherState& state, std::vector<LinearisationPoint> linearised);
 
  private:
+  [[nodiscard]] RetiredKeyframes newly_retired(const SmootherState& state, std::size_t absorbed) const;
+
   std::size_t nodes_ = 0;
-  std::size_t retired_blocks_ = 0;
-  std::size_t retired_loops_ = 0;
+  std::size_t retired_ = 0;  ///< of these, those that had retired
+  std::size_t absorbed_ = 0;
   LoopListMemory loops_;
   LoopListMemory waiting_;
   std::size_t vetoes_ = 0;

@@ -52,7 +52,10 @@ std::vector<LinearisationPoint> take_linearised(IncrementalSolver& solver) {
     ids.insert(static_cast<std::int32_t>(gtsam::Symbol(key).index()));
   }
   std::vector<LinearisationPoint> points;
-  for (const std::int32_t id : ids) points.push_back({id, linearised_at(id, solver)});
+  for (const std::int32_t id : ids) {
+    const bool is_held = solver.linearisation_points().exists(X(id)) || solver.fixed().exists(X(id));
+    if (is_held) points.push_back({id, linearised_at(id, solver)});
+  }
   return points;
 }
 

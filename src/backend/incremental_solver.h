@@ -90,6 +90,9 @@ class IncrementalSolver {
   /// Variables that were fixed before, for a solver that begins anew.
   void add_fixed(const gtsam::Values& values);
 
+  /// Variables that are known, and that no factor will name any more.
+  void release(std::span<const std::uint64_t> known);
+
   /// What is known, and where.
   [[nodiscard]] const gtsam::Values& fixed() const;
 

@@ -98,6 +98,10 @@ bool IncrementalSolver::fix(std::span<const std::uint64_t> known, std::span<cons
 
 void IncrementalSolver::add_fixed(const gtsam::Values& values) { impl_->fixed.insert(values); }
 
+void IncrementalSolver::release(std::span<const std::uint64_t> known) {
+  for (const gtsam::Key key : known) impl_->fixed.erase(key);
+}
+
 const gtsam::Values& IncrementalSolver::fixed() const { return impl_->fixed; }
 
 }  // namespace ignis

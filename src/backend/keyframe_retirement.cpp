@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "backend/keyframe_factors.h"
+#include "backend/keyframe_thinning.h"
 #include "backend/odometry_chain.h"
 #include "backend/revision_report.h"
 
@@ -152,6 +153,18 @@ void forget_waiting_loops(SmootherState& state, LoopEvents& events) {
   std::erase_if(state.waiting, [&](const GraphLoop& loop) { return has_retired(loop, state); });
 }
 
+/// Of the keyframes that had retired before, which are those before place `until`.
+void thin_out(std::size_t until, const BackendConfig& config, IncrementalSolver& solver, SmootherState& state) {
+  const std::vector<std::size_t> places = places_to_absorb(until, config, state);
+  std::vector<gtsam::Key> keys;
+  for (const std::size_t place : places) {
+    keys.push_back(X(state.nodes[place].end.id));
+    state.absorbed.push_back(state.poses[place]);
+  }
+  solver.release(keys);
+  absorb(places, state);
+}
+
 }  // namespace
 
 LoopEvents retire_oldest(const BackendConfig& config, IncrementalSolver& solver, SmootherState& state) {
@@ -171,13 +184,15 @@ LoopEvents retire_oldest(const BackendConfig& config, IncrementalSolver& solver,
   if (!solver.fix(retiring.poses, retiring.other_motions(), instead)) return {};
 
   RetiredKeyframes& retired = state.retired;
-  state.links.erase(state.links.begin(), state.links.begin() + static_cast<std::ptrdiff_t>(until - retired.count()));
+  const std::size_t first = retired.count();
+  state.links.erase(state.links.begin(), state.links.begin() + static_cast<std::ptrdiff_t>(until - first));
   retired.blocks.push_back({until, about_origin(state.poses[until - 1].T_map_body, covariance)});
   retired.newest_motion = motion;
   LoopEvents events;
   retire_loops(state, events);
   forget_waiting_loops(state, events);
   refresh_poses(solver, state);
+  thin_out(first, config, solver, state);
   return events;
 }
 
@@ -192,6 +207,13 @@ Matrix6d since_start(const Matrix6d& covariance, const SmootherState& state) {
 }
 
 std::optional<LoopResult> retired_loop(std::int32_t from_id, std::int32_t to_id, const SmootherState& state) {
+  if (are_retired(from_id, to_id, state) && (is_absorbed(from_id, state) || is_absorbed(to_id, state))) {
+    LoopResult result;
+    result.from_id = from_id;
+    result.to_id = to_id;
+    result.reason_text = "if there was one it stays, for both of its keyframes have retired";
+    return result;
+  }
   const auto found = std::ranges::find_if(state.retired.loops, [&](const GraphLoop& loop) {
     return loop.result.from_id == from_id && loop.result.to_id == to_id;
   });

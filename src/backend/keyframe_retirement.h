@@ -34,7 +34,8 @@ void add_retired_motion(const SmootherState& state, gtsam::NonlinearFactorGraph&
 /// A covariance in body axes of the newest keyframe beside what has retired, against the first keyframe instead.
 [[nodiscard]] Matrix6d since_start(const Matrix6d& covariance, const SmootherState& state);
 
-/// The loop between the two, if it stays in the graph because both have retired.
+/// The loop between the two, if it stays in the graph because both have retired. Of one that went with an absorbed
+/// keyframe no more than that is known.
 [[nodiscard]] std::optional<LoopResult> retired_loop(std::int32_t from_id, std::int32_t to_id,
                                                      const SmootherState& state);
 

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "backend/place_list.h"
 #include "common/so3.h"
 
 namespace ignis {
@@ -41,6 +42,11 @@ void OdometryChain::append(const Pose& T_odom_body, const Matrix6d& step_covaria
   poses_.push_back(T_odom_body);
   sums_.push_back(sum);
   newest_ = pose_in_odom;
+}
+
+void OdometryChain::erase(std::span<const std::size_t> places) {
+  erase_places(poses_, places);
+  erase_places(sums_, places);
 }
 
 Pose OdometryChain::T_from_to(std::size_t from, std::size_t to) const { return poses_[from].inverse() * poses_[to]; }

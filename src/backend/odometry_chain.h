@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "backend/information.h"
@@ -25,6 +27,9 @@ class OdometryChain {
   /// Covariances of attitude then position, body axes of this pose: `step_covariance` of the motion since the previous
   /// pose, ignored in the first one, and `pose_covariance` of T_odom_body as the filter states it.
   void append(const Pose& T_odom_body, const Matrix6d& step_covariance, const Matrix6d& pose_covariance);
+
+  /// Lets go of places, ascending, not the newest. What is said of the others stays as it is.
+  void erase(std::span<const std::size_t> places);
 
   [[nodiscard]] std::size_t size() const { return poses_.size(); }
   [[nodiscard]] const Pose& pose(std::size_t place) const { return poses_[place]; }

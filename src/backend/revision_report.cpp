@@ -5,6 +5,8 @@
 #include <gtsam/inference/Symbol.h>
 #include <gtsam/nonlinear/Values.h>
 
+#include <algorithm>
+
 #include "backend/axis_doubt.h"
 #include "backend/gtsam_conversion.h"
 #include "backend/keyframe_factors.h"
@@ -84,6 +86,13 @@ SmootherUpdate present_revision(IncrementalSolver& solver, const SmootherState& 
   describe_newest(solver, state, update);
   add_covariance(solver, state, update);
   return update;
+}
+
+std::vector<KeyframePose> all_poses(const SmootherState& state) {
+  std::vector<KeyframePose> poses = state.poses;
+  poses.insert(poses.end(), state.absorbed.begin(), state.absorbed.end());
+  std::ranges::sort(poses, {}, &KeyframePose::id);
+  return poses;
 }
 
 PoseGraph exported_graph(const SmootherState& state) {

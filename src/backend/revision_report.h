@@ -19,7 +19,10 @@ void report_revision(IncrementalSolver& solver, SmootherState& state, SmootherUp
 /// The same as it stands, without poses.
 [[nodiscard]] SmootherUpdate present_revision(IncrementalSolver& solver, const SmootherState& state);
 
-/// Poses, odometry and loops for keyframes.g2o.
+/// All keyframes as the graph places them, ascending ids.
+[[nodiscard]] std::vector<KeyframePose> all_poses(const SmootherState& state);
+
+/// Poses, odometry and loops for keyframes.g2o, without keyframes that were absorbed.
 [[nodiscard]] PoseGraph exported_graph(const SmootherState& state);
 
 }  // namespace ignis

@@ -57,10 +57,10 @@ void measure_gap(const ShadowProblem::Graph& graph, const gtsam::Values& optimum
   }
 }
 
-/// A variable of a keyframe that has retired.
+/// A variable of a keyframe that has retired, or has been absorbed since.
 bool has_retired(gtsam::Key key, const SmootherState& state) {
-  const GraphNode* node = state.node_of(static_cast<std::int32_t>(gtsam::Symbol(key).index()));
-  return node != nullptr && state.place_of(node->end.id) < state.retired.count();
+  const auto id = static_cast<std::int32_t>(gtsam::Symbol(key).index());
+  return are_retired(id, id, state);
 }
 
 /// The optimum as a starting point for the graph as it is by now: keyframes that came later keep their motion relative

@@ -34,7 +34,7 @@ struct Smoother::Impl {
   void close_loop(SmootherUpdate& update) {
     LoopProposal proposal = search_loop(state, config, gates);
     proposal.result.utime = state.nodes.back().end.filter.utime;
-    proposal.result.keyframes = static_cast<int>(state.nodes.size());
+    proposal.result.keyframes = keyframes_in(state);
     update.loop = proposal.result;
     if (!proposal.verified()) return;
     judge_loop(proposal.result, proposal.rows, update);
@@ -112,13 +112,19 @@ SmootherUpdate Smoother::add_loop(const LoopMeasurement& measurement) {
   result.to_id = measurement.to_id;
   result.T_to_from = measurement.T_to_from;
   result.reason = LoopReason::kSolverRefused;
-  result.keyframes = static_cast<int>(state.nodes.size());
+  result.keyframes = keyframes_in(state);
   const GraphNode* from = state.node_of(measurement.from_id);
   const GraphNode* to = state.node_of(measurement.to_id);
-  if (from == nullptr || to == nullptr || from == to) {
+  const auto is_known = [&](const GraphNode* node, std::int32_t id) {
+    return node != nullptr || is_absorbed(id, state);
+  };
+  if (!is_known(from, measurement.from_id) || !is_known(to, measurement.to_id) ||
+      measurement.from_id == measurement.to_id) {
     result.reason_text = "the loop names keyframes that the graph does not hold";
-  } else if (std::max(state.place_of(from->end.id), state.place_of(to->end.id)) < state.retired.count()) {
+  } else if (are_retired(measurement.from_id, measurement.to_id, state)) {
     result.reason_text = "both of the loop's keyframes have retired";
+  } else if (from == nullptr || to == nullptr) {
+    result.reason_text = "one of the loop's keyframes has retired, and another stands for it";
   } else if (!measurement.T_to_from.all_finite() || !measurement.information.allFinite()) {
     result.reason_text = "the loop is not finite";
   } else if (is_vetoed(state.vetoes, measurement.from_id, measurement.to_id, config.loop_min_spacing)) {
@@ -178,7 +184,7 @@ SmootherUpdate Smoother::present() const { return present_revision(impl_->solver
 
 void Smoother::accept_gap_before(std::int32_t id) { impl_->state.expected_id = std::max(impl_->state.expected_id, id); }
 
-const std::vector<KeyframePose>& Smoother::all_poses() const { return impl_->state.poses; }
+std::vector<KeyframePose> Smoother::all_poses() const { return ignis::all_poses(impl_->state); }
 Pose Smoother::T_map_odom() const { return ignis::T_map_odom(impl_->state); }
 std::int32_t Smoother::revision() const { return impl_->state.revision; }
 std::int32_t Smoother::expected_id() const { return impl_->state.expected_id; }
@@ -186,9 +192,11 @@ PoseGraph Smoother::pose_graph() const { return exported_graph(impl_->state); }
 
 SmootherStats Smoother::stats() const {
   SmootherStats stats = impl_->state.stats;
-  stats.keyframes = static_cast<int>(impl_->state.nodes.size());
-  stats.retired = static_cast<int>(impl_->state.retired.count());
-  stats.loops_kept = static_cast<int>(impl_->state.loops.size() + impl_->state.retired.loops.size());
+  stats.keyframes = keyframes_in(impl_->state);
+  stats.absorbed = static_cast<int>(impl_->state.absorbed.size());
+  stats.retired = stats.absorbed + static_cast<int>(impl_->state.retired.count());
+  stats.loops_kept =
+      impl_->state.absorbed_loops + static_cast<int>(impl_->state.loops.size() + impl_->state.retired.loops.size());
   stats.loops_on_trial = static_cast<int>(std::ranges::count(impl_->state.loops, LoopStage::kOnTrial,
                                                              [](const GraphLoop& loop) { return loop.result.stage; }));
   stats.loops_waiting = static_cast<int>(impl_->state.waiting.size());
@@ -210,7 +218,7 @@ SmootherRestoration restore_smoother(const BackendConfig& config, const LoopGate
                                      std::span<const std::span<const std::byte>> records,
                                      const RecordArchive* archive) {
   SmootherRestoration restoration{Smoother(config, gates, archive), 0, {}};
-  RestoredGraph graph;
+  RestoredGraph graph(config);
   graph.state.clouds = empty_store(config, archive);
   for (const std::span<const std::byte> record : records) {
     std::optional<GraphChange> change = decode_change(record);

@@ -51,6 +51,7 @@ struct SmootherUpdate {
 struct SmootherStats {
   int keyframes = 0;
   int retired = 0;          ///< of these, the oldest, that stay where they are
+  int absorbed = 0;         ///< of these, for which another stands: nothing but their poses is kept
   int loops_kept = 0;       ///< in the graph, on trial or kept
   int loops_on_trial = 0;   ///< of these, on trial
   int loops_waiting = 0;    ///< verified, but outside of the graph
@@ -128,7 +129,7 @@ class Smoother {
   [[nodiscard]] SmootherUpdate present() const;
 
   /// All keyframes as the graph places them, ascending ids.
-  [[nodiscard]] const std::vector<KeyframePose>& all_poses() const;
+  [[nodiscard]] std::vector<KeyframePose> all_poses() const;
   [[nodiscard]] Pose T_map_odom() const;
   [[nodiscard]] std::int32_t revision() const;
   [[nodiscard]] std::int32_t expected_id() const;

@@ -14,6 +14,17 @@ std::size_t SmootherState::place_of(std::int32_t id) const {
   return static_cast<std::size_t>(node_of(id) - nodes.data());
 }
 
+int keyframes_in(const SmootherState& state) { return static_cast<int>(state.nodes.size() + state.absorbed.size()); }
+
+bool is_absorbed(std::int32_t id, const SmootherState& state) {
+  return std::ranges::contains(state.absorbed, id, &KeyframePose::id);
+}
+
+bool are_retired(std::int32_t a, std::int32_t b, const SmootherState& state) {
+  const std::size_t retired = state.retired.count();
+  return retired > 0 && std::max(a, b) <= state.nodes[retired - 1].end.id;
+}
+
 void follow_nodes(SmootherState& state, const BackendConfig& config) {
   const WhiteningRows loose = loose_rows(config);
   const Matrix6d background = loose.transpose() * loose;

@@ -62,13 +62,14 @@ struct RetiredKeyframes {
 /// share their indices.
 struct SmootherState {
   std::vector<GraphNode> nodes;
-  RetiredKeyframes retired;         ///< the oldest of them
-  std::deque<KeyframeLink> links;   ///< of the others: what their factors are made of
-  CloudStore clouds;                ///< body frame, one per node
-  std::vector<KeyframePose> poses;  ///< as the graph places them, one per node
-  std::vector<Pose> published;      ///< as last listed in an update
-  std::vector<GraphLoop> loops;     ///< in the graph
-  std::vector<GraphLoop> waiting;   ///< verified, but outside of it
+  RetiredKeyframes retired;            ///< the oldest of them
+  std::deque<KeyframeLink> links;      ///< of the others: what their factors are made of
+  CloudStore clouds;                   ///< body frame, one per node
+  std::vector<KeyframePose> poses;     ///< as the graph places them, one per node
+  std::vector<Pose> published;         ///< as last listed in an update
+  std::vector<KeyframePose> absorbed;  ///< keyframes without a node: where they stay (keyframe_thinning.h)
+  std::vector<GraphLoop> loops;        ///< in the graph
+  std::vector<GraphLoop> waiting;      ///< verified, but outside of it
   std::vector<LoopVeto> vetoes;
   SmootherStats stats;
   Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();
@@ -77,6 +78,7 @@ struct SmootherState {
   std::int32_t last_loop_id = -1;
   std::int32_t next_loop_number = 0;
   std::int32_t revision = 0;
+  int absorbed_loops = 0;  ///< loops that went with them
 
   // What follows from the above; brought up to date by follow_nodes().
   PlaceIndex places{kPlaceCell};
@@ -89,6 +91,15 @@ struct SmootherState {
   /// Index of a keyframe that the graph holds.
   [[nodiscard]] std::size_t place_of(std::int32_t id) const;
 };
+
+/// How many the graph has taken, absorbed ones among them.
+[[nodiscard]] int keyframes_in(const SmootherState& state);
+
+/// Whether the graph knows the keyframe by its pose alone.
+[[nodiscard]] bool is_absorbed(std::int32_t id, const SmootherState& state);
+
+/// Whether both of them, which the graph has taken, are estimated no more.
+[[nodiscard]] bool are_retired(std::int32_t a, std::int32_t b, const SmootherState& state);
 
 /// Brings what follows from nodes and poses up to date.
 void follow_nodes(SmootherState& state, const BackendConfig& config);

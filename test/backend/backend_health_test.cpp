@@ -20,6 +20,10 @@ TEST(BackendHealth, SaysHowFarTheGraphIsFromTheBatchOptimumAndHowManyKeyframesHa
   EXPECT_EQ(health_of(situation).text, "OK");
   situation.graph.retired = 1'000;
   EXPECT_EQ(health_of(situation).text, "OK; the oldest 1000 of 5000 keyframes have retired");
+  situation.graph.absorbed = 800;
+  EXPECT_EQ(health_of(situation).text,
+            "OK; the oldest 1000 of 5000 keyframes have retired, others stand for 800 of them");
+  situation.graph.absorbed = 0;
   situation.graph.shadow_checks = 3;
   situation.graph.shadow_swaps = 1;
   situation.graph.shadow_gap_m = 0.0012;

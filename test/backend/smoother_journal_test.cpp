@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "backend/graph_change.h"
+#include "backend/laps.h"
 #include "backend/smoother.h"
 #include "backend/synthetic_drive.h"
 #include "backend/text_contains.h"
@@ -75,6 +76,7 @@ void expect_same(const Smoother& a, const Smoother& b) {
   EXPECT_EQ(a.revision(), b.revision());
   EXPECT_EQ(a.expected_id(), b.expected_id());
   EXPECT_EQ(a.stats().retired, b.stats().retired);
+  EXPECT_EQ(a.stats().absorbed, b.stats().absorbed);
   EXPECT_EQ(a.stats().loops_kept, b.stats().loops_kept);
   EXPECT_EQ(a.stats().loops_withdrawn, b.stats().loops_withdrawn);
   EXPECT_EQ(a.stats().without_imu, b.stats().without_imu);
@@ -143,6 +145,30 @@ TEST_P(SmootherJournal, KilledAnywhereEndsWithTheSameGraph) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, SmootherJournal,
                          ::testing::Combine(::testing::Range(1U, 13U), ::testing::Values(1000, 24)));
+
+TEST(SmootherJournalThinning, KilledAnywhereEndsWithTheSamePlaces) {
+  const testing::Drive drive = testing::make_drive({.seed = 3, .keyframes = 160});
+  BackendConfig config = trusting(40);
+  config.use_loop_closing = false;
+  Smoother uninterrupted{config, LoopGates()};
+  Smoother killed{config, LoopGates()};
+  Records records;
+  for (const Keyframe& keyframe : drive.keyframes) {
+    Step step{.keyframe = &keyframe, .gap_before = -1, .loop = {}};
+    const bool closes = keyframe.id >= testing::kLap && keyframe.id % 3 == 0;
+    if (closes) step.loop = testing::loop_in(drive, keyframe.id, keyframe.id % testing::kLap);
+    take(uninterrupted, step);
+    take(killed, step);
+    records.push_back(killed.take_change());
+    if (keyframe.id % 7 != 0) continue;
+    SmootherRestoration restoration = restored(records, config);
+    EXPECT_EQ(restoration.problem, "");
+    expect_same(killed, restoration.smoother);
+    killed = std::move(restoration.smoother);
+  }
+  EXPECT_GT(uninterrupted.stats().absorbed, 70);
+  expect_same(uninterrupted, killed);
+}
 
 TEST(SmootherJournalSearch, FindsTheSameLoopsAfterwards) {
   const testing::Drive drive = testing::make_drive({.seed = 2, .keyframes = 45, .cloud_points = 3000});
@@ -242,6 +268,13 @@ TEST(SmootherJournalRecords, ARetirementThatCannotBeIsRefusedAndNamed) {
                                 "between keyframes that have retired"));
   EXPECT_TRUE(
       testing::contains(problem([](GraphChange& change) { change.state.links.clear(); }), "links of keyframes"));
+  const auto absorbing = [&](std::vector<std::int32_t> ids) {
+    return problem([&](GraphChange& change) { change.absorbed = ids; });
+  };
+  EXPECT_TRUE(testing::contains(absorbing({44}), "before its time")) << "it is estimated";
+  EXPECT_TRUE(testing::contains(absorbing({4000}), "before its time")) << "nobody knows it";
+  EXPECT_TRUE(testing::contains(absorbing({3, 1}), "not in order"));
+  EXPECT_TRUE(testing::contains(absorbing({0, 1, 2, 3}), "a loop ends at")) << "of one that is estimated";
 }
 
 TEST(SmootherJournalRecords, HoldWhatTheFrontEndKnowsOfItsDrift) {
