@@ -115,11 +115,11 @@ Tile& ThreeLevelMap::tile_of(CellKey key, const CellIndex& index) {
 }
 
 void ThreeLevelMap::enter(Tile& tile, const Location& location, LevelSet levels, float intensity, std::int32_t id) {
-  if (is_carved(tile, location.cell_in_tile[1])) return;
+  if (is_carved(tile, location)) return;
   for (std::size_t i = 0; i < kLevels; ++i) {
     if (!has(levels, i)) continue;
-    const Voxel voxel{location.from_centre[i], intensity, id};
-    if (tile.insert(i, location.cell_in_tile[i], voxel, version_)) ++sizes_[i];
+    const Voxel voxel{locator_.from_centre(i, location), intensity, id};
+    if (tile.insert(i, locator_.cell_in_tile(i, location), voxel, version_)) ++sizes_[i];
   }
 }
 
@@ -156,8 +156,8 @@ InsertCounts ThreeLevelMap::insert(std::int32_t id, std::span<const CloudPoint> 
   return counts;
 }
 
-bool ThreeLevelMap::is_carved(const Tile& tile, std::uint32_t mid_cell) const {
-  return !tile.votes.empty() && tile.votes[mid_cell] >= config_.carve_keyframes;
+bool ThreeLevelMap::is_carved(const Tile& tile, const Location& location) const {
+  return !tile.votes.empty() && tile.votes[locator_.cell_in_tile(1, location)] >= config_.carve_keyframes;
 }
 
 /// Adds or takes back a cloud's votes; lists the tiles in which a cell is carved now and was not, or the reverse.
@@ -172,7 +172,7 @@ void ThreeLevelMap::count_votes(const Cloud& cloud, std::span<const FreeCell> fr
     const Location location = locator_.locate(p_world);
     if (tile == nullptr || tile->index() != location.tile) tile = &tile_of(pack(location.tile), location.tile);
     if (tile->votes.empty()) tile->votes.resize(cells * cells * cells);
-    std::uint16_t& votes = tile->votes[location.cell_in_tile[1]];
+    std::uint16_t& votes = tile->votes[locator_.cell_in_tile(1, location)];
     votes = static_cast<std::uint16_t>(votes + sign);
     const CellKey key = pack(location.tile);
     if (votes == threshold && !tile->clouds.empty() && (changed.empty() || changed.back() != key)) {

@@ -126,7 +126,7 @@ class ThreeLevelMap {
   void apply_windows(const CloudLookup& clouds);
   Tile& tile_of(CellKey key, const CellIndex& index);
   void enter(Tile& tile, const Location& location, LevelSet levels, float intensity, std::int32_t id);
-  [[nodiscard]] bool is_carved(const Tile& tile, std::uint32_t mid_cell) const;
+  [[nodiscard]] bool is_carved(const Tile& tile, const Location& location) const;
   void leave_tiles(std::int32_t id, std::vector<CellKey>& left);
   void count_votes(const Cloud& cloud, std::span<const FreeCell> free, int sign, std::vector<CellKey>& changed);
   void refill_all_levels(std::vector<CellKey>& tiles, const CloudLookup& clouds);

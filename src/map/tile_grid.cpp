@@ -29,7 +29,7 @@ TileGrid tile_grid(const MapConfig& config) {
 PointLocator::PointLocator(const TileGrid& grid)
     : grid_(grid), local_per_m_(1.0 / grid.cell_m[0]), tiles_per_local_(1.0 / grid.cells_per_tile[0]) {
   for (std::size_t from = 0; from < kLevels; ++from) {
-    for (std::size_t to = from + 1; to < kLevels; ++to) {
+    for (std::size_t to = from; to < kLevels; ++to) {
       const int ratio = grid.cells_per_tile[from] / grid.cells_per_tile[to];
       for (int cell = 0; cell < grid.cells_per_tile[from]; ++cell) {
         parents_[from][to].push_back(static_cast<std::uint32_t>(cell / ratio));
@@ -40,7 +40,7 @@ PointLocator::PointLocator(const TileGrid& grid)
 
 CellIndex PointLocator::cell_of(std::size_t level, const Eigen::Vector3d& p_world) const {
   const Location location = locate(p_world);
-  return grid_.world_cell(level, location.tile, location.cell_in_tile[level]);
+  return grid_.world_cell(level, location.tile, cell_in_tile(level, location));
 }
 
 }  // namespace ignis

@@ -60,36 +60,45 @@ struct TileGrid {
 /// Tiles of eight coarse cells along an edge.
 [[nodiscard]] TileGrid tile_grid(const MapConfig& config);
 
-/// Where a point lies on all levels at once.
+/// Where a point lies: in which tile, and in which of its local cells along each axis. The coarser cells follow from
+/// that (PointLocator).
 struct Location {
+  Eigen::Vector3d p_world;  ///< [m]
   CellIndex tile;
-  std::array<std::uint32_t, kLevels> cell_in_tile;
-  std::array<Eigen::Vector3f, kLevels> from_centre;  ///< [m]
+  std::array<std::uint32_t, 3> local{};
 };
 
 /// Finds the cells of points. The cell of a coarser level follows from that of the local one, so that cells nest
-/// exactly whatever their sizes and the rounding.
+/// exactly whatever their sizes and the rounding. Most points are asked for on one level, hardly any on all three.
 class PointLocator {
  public:
   explicit PointLocator(const TileGrid& grid);
 
   [[nodiscard]] Location locate(const Eigen::Vector3d& p_world) const {
-    Location location;
     const Axis x = along(p_world.x());
     const Axis y = along(p_world.y());
     const Axis z = along(p_world.z());
-    location.tile = {x.tile, y.tile, z.tile};
-    for (std::size_t i = 0; i < kLevels; ++i) {
-      const auto n = static_cast<std::uint32_t>(grid_.cells_per_tile[i]);
-      location.cell_in_tile[i] = (x.cell[i] * n + y.cell[i]) * n + z.cell[i];
-      const double cell_m = grid_.cell_m[i];
-      const auto offset = [&](double p, const Axis& axis) {
-        const double cell = static_cast<double>(axis.tile) * static_cast<double>(n) + axis.cell[i];
-        return static_cast<float>(p - cell_m * (cell + 0.5));
-      };
-      location.from_centre[i] = {offset(p_world.x(), x), offset(p_world.y(), y), offset(p_world.z(), z)};
-    }
-    return location;
+    return {p_world, {x.tile, y.tile, z.tile}, {x.local, y.local, z.local}};
+  }
+
+  /// Number of the point's cell within its tile.
+  [[nodiscard]] std::uint32_t cell_in_tile(std::size_t level, const Location& location) const {
+    const auto n = static_cast<std::uint32_t>(grid_.cells_per_tile[level]);
+    const std::vector<std::uint32_t>& cell = parents_[0][level];
+    return (cell[location.local[0]] * n + cell[location.local[1]]) * n + cell[location.local[2]];
+  }
+
+  /// Where the point lies from the centre of its cell [m].
+  [[nodiscard]] Eigen::Vector3f from_centre(std::size_t level, const Location& location) const {
+    const double n = grid_.cells_per_tile[level];
+    const double cell_m = grid_.cell_m[level];
+    const auto offset = [&](double p, std::int32_t tile, std::uint32_t local) {
+      const double cell = static_cast<double>(tile) * n + parents_[0][level][local];
+      return static_cast<float>(p - cell_m * (cell + 0.5));
+    };
+    return {offset(location.p_world.x(), location.tile.x, location.local[0]),
+            offset(location.p_world.y(), location.tile.y, location.local[1]),
+            offset(location.p_world.z(), location.tile.z, location.local[2])};
   }
 
   [[nodiscard]] CellIndex cell_of(std::size_t level, const Eigen::Vector3d& p_world) const;
@@ -105,7 +114,7 @@ class PointLocator {
  private:
   struct Axis {
     std::int32_t tile;
-    std::array<std::uint32_t, kLevels> cell;  // within the tile
+    std::uint32_t local;  // cell within the tile
   };
 
   [[nodiscard]] Axis along(double coordinate) const {
@@ -113,13 +122,13 @@ class PointLocator {
     // Half a cell away from every multiple, so that no rounding can reach the wrong tile.
     const int tile = floor_to_int((static_cast<double>(local) + 0.5) * tiles_per_local_);
     const auto within = static_cast<std::uint32_t>(local - tile * grid_.cells_per_tile[0]);
-    return {tile, {within, parents_[0][1][within], parents_[0][2][within]}};
+    return {tile, within};
   }
 
   TileGrid grid_;
   double local_per_m_;
   double tiles_per_local_;
-  // Along one axis of a tile: which cell of the second level contains a cell of the first.
+  // Along one axis of a tile: which cell of the second level contains a cell of the first, not coarser one.
   std::array<std::array<std::vector<std::uint32_t>, kLevels>, kLevels> parents_;
 };
 

@@ -36,10 +36,11 @@ TEST(PointLocator, FindsTheCellsThatTheDefinitionGives) {
       const Location location = locator.locate(p);
       EXPECT_EQ(location.tile, floor_cell(p, 4.0));
       for (std::size_t i = 0; i < kLevels; ++i) {
-        const CellIndex cell = grid.world_cell(i, location.tile, location.cell_in_tile[i]);
+        const CellIndex cell = grid.world_cell(i, location.tile, locator.cell_in_tile(i, location));
         ASSERT_EQ(cell, floor_cell(p, grid.cell_m[i]));
-        EXPECT_EQ(grid.cell_in_tile(i, location.tile, cell), location.cell_in_tile[i]);
-        EXPECT_LT((cell_centre(cell, grid.cell_m[i]) + location.from_centre[i].cast<double>() - p).norm(), 1e-6);
+        EXPECT_EQ(grid.cell_in_tile(i, location.tile, cell), locator.cell_in_tile(i, location));
+        EXPECT_LT((cell_centre(cell, grid.cell_m[i]) + locator.from_centre(i, location).cast<double>() - p).norm(),
+                  1e-6);
       }
     }
   }
@@ -58,12 +59,15 @@ TEST(PointLocator, PutsPointsOnBordersIntoNestedCellsWhateverTheSizes) {
       const Location location = locator.locate(p + Eigen::Vector3d::Constant(nudge));
       for (std::size_t k = 0; k < kLevels; ++k) {
         const int n = grid.cells_per_tile[k];
-        ASSERT_LT(location.cell_in_tile[k], static_cast<std::uint32_t>(n * n * n));
-        EXPECT_LT(location.from_centre[k].cwiseAbs().maxCoeff(), 0.5 * grid.cell_m[k] + 1e-6);
+        ASSERT_LT(locator.cell_in_tile(k, location), static_cast<std::uint32_t>(n * n * n));
+        EXPECT_LT(locator.from_centre(k, location).cwiseAbs().maxCoeff(), 0.5 * grid.cell_m[k] + 1e-6);
       }
-      EXPECT_EQ(locator.parent_in_tile(0, 1, grid.split(0, location.cell_in_tile[0])), location.cell_in_tile[1]);
-      EXPECT_EQ(locator.parent_in_tile(0, 2, grid.split(0, location.cell_in_tile[0])), location.cell_in_tile[2]);
-      EXPECT_EQ(locator.parent_in_tile(1, 2, grid.split(1, location.cell_in_tile[1])), location.cell_in_tile[2]);
+      EXPECT_EQ(locator.parent_in_tile(0, 1, grid.split(0, locator.cell_in_tile(0, location))),
+                locator.cell_in_tile(1, location));
+      EXPECT_EQ(locator.parent_in_tile(0, 2, grid.split(0, locator.cell_in_tile(0, location))),
+                locator.cell_in_tile(2, location));
+      EXPECT_EQ(locator.parent_in_tile(1, 2, grid.split(1, locator.cell_in_tile(1, location))),
+                locator.cell_in_tile(2, location));
     }
   }
 }
