@@ -8,6 +8,7 @@
 
 #include "backend/graph_change.h"
 #include "backend/memory_archive.h"
+#include "backend/place_list.h"
 #include "backend/text_contains.h"
 
 namespace ignis {
@@ -61,6 +62,32 @@ TEST(CloudStore, GivesEveryCloudWhateverWasUsedAndStaysWithinItsBound) {
     EXPECT_EQ(store.forgotten(), 0);
     EXPECT_EQ(store.unreadable(), 0);
     EXPECT_GT(archive.reads, 20);
+  }
+}
+
+TEST(CloudStore, GivesEveryOtherCloudWhateverWasLetGo) {
+  constexpr std::size_t kBound = 5 * kCloudBytes;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    std::mt19937 random(seed);
+    testing::MemoryArchive archive;
+    CloudStore store(kBound, &archive);
+    std::vector<std::int32_t> held;
+    for (std::int32_t keyframe = 0; keyframe < 60; ++keyframe) {
+      add(store, archive, keyframe);
+      held.push_back(keyframe);
+      EXPECT_LE(store.bytes_in_memory(), kBound + kCloudBytes);
+      if (keyframe % 7 == 6) {
+        const std::size_t first = random() % (held.size() - 3);
+        const std::vector<std::size_t> gone{first, first + 2};
+        store.erase(gone);
+        erase_places(held, gone);
+      }
+      ASSERT_EQ(store.size(), held.size());
+      EXPECT_EQ(store.recorded(), held.size());
+      const auto index = random() % held.size();
+      ASSERT_TRUE(is_cloud_of(store.find(index), held[index]));
+    }
+    for (std::size_t i = 0; i < held.size(); ++i) ASSERT_TRUE(is_cloud_of(store.find(i), held[i]));
   }
 }
 
