@@ -38,7 +38,7 @@ void check(std::span<const std::byte> bytes) {
     return;
   }
   require(contents.damage.empty() == (contents.whole_bytes == bytes.size()));
-  RestoredGraph graph;
+  RestoredGraph graph{BackendConfig()};
   for (const std::span<const std::byte> payload : contents.payloads) {
     require(payload.data() >= bytes.data() && payload.data() + payload.size() <= bytes.data() + contents.whole_bytes);
     std::optional<GraphChange> change = decode_change(payload);

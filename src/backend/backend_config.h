@@ -90,9 +90,10 @@ struct BackendConfig {
                  "sigma of the zero velocity of a keyframe that stood still");
     visit.integer("estimated_keyframes", self.estimated_keyframes, {20, 1000000}, "keyframes",
                   "newest keyframes whose poses the graph estimates; older ones stay where they are, as known places");
-    visit.number("retired_spacing_m", self.retired_spacing_m, {0.0, 100.0}, "m",
-                 "of keyframes that have retired and look the same way this far apart, one pass keeps its clouds and "
-                 "loops, the others their poses alone; 0: all are kept");
+    visit.number(
+        "retired_spacing_m", self.retired_spacing_m, {0.0, 100.0}, "m",
+        "of keyframes that have retired and look the same way at most this far apart, the first keeps its cloud "
+        "and loops, the others their poses alone; 0: all are kept");
     visit.number("cloud_voxel_m", self.cloud_voxel_m, {0.01, 2.0}, "m",
                  "of a keyframe's cloud one point per voxel is kept, in memory and in the journal");
     visit.number("cloud_memory_mb", self.cloud_memory_mb, {0.1, 1e6}, "MB",

@@ -5,8 +5,8 @@
 #include <format>
 #include <utility>
 
+#include "backend/erase_places.h"
 #include "backend/graph_change.h"
-#include "backend/place_list.h"
 
 namespace ignis {
 

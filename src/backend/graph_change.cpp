@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <format>
 #include <functional>
+#include <iterator>
 #include <utility>
 
+#include "backend/erase_places.h"
 #include "backend/keyframe_thinning.h"
-#include "backend/place_list.h"
 #include "common/byte_codec.h"
 #include "common/measurement_bytes.h"
 
@@ -126,6 +127,13 @@ void copy_scalars(const SmootherState& from, SmootherState& to) {
   to.absorbed_loops = from.absorbed_loops;
 }
 
+std::vector<std::int32_t> ids_of(const std::vector<KeyframePose>& poses) {
+  std::vector<std::int32_t> ids;
+  ids.reserve(poses.size());
+  for (const KeyframePose& pose : poses) ids.push_back(pose.id);
+  return ids;
+}
+
 std::size_t index_of(const std::vector<GraphNode>& nodes, std::int32_t id) {
   const auto found = std::ranges::lower_bound(nodes, id, {}, [](const GraphNode& node) { return node.end.id; });
   return found != nodes.end() && found->end.id == id ? static_cast<std::size_t>(found - nodes.begin()) : nodes.size();
@@ -209,6 +217,9 @@ std::string absorption_problem(const SmootherState& state, const GraphChange& ch
   const auto is_absorbed = [&](std::int32_t id) { return std::ranges::binary_search(change.absorbed, id); };
   if (std::ranges::adjacent_find(change.absorbed, std::greater_equal()) != change.absorbed.end())
     return "keyframes that were absorbed are not in order";
+  const std::int64_t loops = std::ssize(state.retired.loops) + std::ssize(state.loops);
+  const std::int64_t went = std::int64_t{change.state.absorbed_loops} - state.absorbed_loops;
+  if (went < 0 || went > loops) return "more loops went with keyframes than there were";
   for (const std::int32_t id : change.absorbed) {
     if (index_of(state.nodes, id) + 1 >= retired) return std::format("keyframe {} was absorbed before its time", id);
   }
@@ -263,26 +274,27 @@ std::string RestoredGraph::apply(GraphChange change) {
   while (state.links.size() > state.nodes.size() - state.retired.count()) state.links.pop_front();
   follow_nodes(state, config);
   let_go(change.absorbed);
-  copy_scalars(change.state, state);  // with the loops that went
+  copy_scalars(change.state, state);
   return {};
 }
 
 void RestoredGraph::let_go(std::span<const std::int32_t> absorbed) {
   std::vector<std::size_t> places;
+  std::vector<KeyframePose> poses;
   for (const std::int32_t id : absorbed) {
     places.push_back(index_of(state.nodes, id));
-    state.absorbed.push_back({id, linearised[places.back()].state.T_odom_body});
+    poses.push_back({id, linearised[places.back()].state.T_odom_body});
   }
-  absorb(places, state);
+  absorb(places, poses, state);
   erase_places(linearised, places);
 }
 
-ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph()) {}
+ChangeTracker::ChangeTracker() : ChangeTracker(RestoredGraph(BackendConfig())) {}
 
 ChangeTracker::ChangeTracker(const RestoredGraph& known)
     : nodes_(known.state.nodes.size()),
       retired_(known.state.retired.count()),
-      absorbed_(known.state.absorbed.size()),
+      absorbed_(ids_of(known.state.absorbed)),
       vetoes_(known.state.vetoes.size()) {
   static_cast<void>(loops_.next(known.state.loops));
   static_cast<void>(waiting_.next(known.state.waiting));
@@ -304,8 +316,10 @@ RetiredKeyframes ChangeTracker::newly_retired(const SmootherState& state, std::s
 
 GraphChange ChangeTracker::next(const SmootherState& state, std::vector<LinearisationPoint> linearised) {
   GraphChange change;
-  for (; absorbed_ < state.absorbed.size(); ++absorbed_) change.absorbed.push_back(state.absorbed[absorbed_].id);
-  // All of them had retired before.
+  std::vector<std::int32_t> absorbed = ids_of(state.absorbed);
+  std::ranges::set_difference(absorbed, absorbed_, std::back_inserter(change.absorbed));
+  absorbed_ = std::move(absorbed);
+  // All of the new ones had retired before.
   nodes_ -= change.absorbed.size();
   retired_ -= change.absorbed.size();
   change.state.nodes.assign(state.nodes.begin() + static_cast<std::ptrdiff_t>(nodes_), state.nodes.end());

@@ -42,7 +42,7 @@ struct GraphChange {
 /// State and linearisation points by node (of those that have retired: where they stay), as the changes so far leave
 /// them.
 struct RestoredGraph {
-  explicit RestoredGraph(BackendConfig how = {}) : config(std::move(how)) {}
+  explicit RestoredGraph(BackendConfig how) : config(std::move(how)) {}
 
   BackendConfig config;
   SmootherState state;
@@ -56,7 +56,7 @@ struct RestoredGraph {
   void let_go(std::span<const std::int32_t> absorbed);
 };
 
-/// Finds what changed since it looked last.
+/// Finds what changed since it looked last. Keyframes must not retire twice in between.
 class ChangeTracker {
  public:
   ChangeTracker();
@@ -71,8 +71,8 @@ class ChangeTracker {
   [[nodiscard]] RetiredKeyframes newly_retired(const SmootherState& state, std::size_t absorbed) const;
 
   std::size_t nodes_ = 0;
-  std::size_t retired_ = 0;  ///< of these, those that had retired
-  std::size_t absorbed_ = 0;
+  std::size_t retired_ = 0;             ///< of these, those that had retired
+  std::vector<std::int32_t> absorbed_;  ///< ids, ascending
   LoopListMemory loops_;
   LoopListMemory waiting_;
   std::size_t vetoes_ = 0;

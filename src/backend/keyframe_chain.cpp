@@ -11,6 +11,7 @@
 #include "backend/information.h"
 #include "backend/keyframe_check.h"
 #include "backend/keyframe_factors.h"
+#include "backend/loose_odometry.h"
 #include "backend/plane_map.h"
 #include "backend/scan_trust.h"
 
@@ -70,6 +71,15 @@ SolverOutcome insert_next(const Keyframe& keyframe, const BackendConfig& config,
   return outcome;
 }
 
+/// Whether a keyframe that was absorbed, or refused, could have the stamp of `keyframe`: between those of the nodes
+/// around its id.
+bool comes_between(const Keyframe& keyframe, const std::vector<GraphNode>& nodes) {
+  const auto id_of = [](const GraphNode& node) { return node.end.id; };
+  const auto later = std::ranges::upper_bound(nodes, keyframe.id, {}, id_of);
+  if (later == nodes.end() || keyframe.state.utime >= later->end.filter.utime) return false;
+  return later == nodes.begin() || keyframe.state.utime > std::prev(later)->end.filter.utime;
+}
+
 }  // namespace
 
 KeyframeVerdict verdict_on(const Keyframe& keyframe, const SmootherState& state, std::string& reason) {
@@ -100,7 +110,8 @@ bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state) {
            node->end.filter.T_odom_body.translation != keyframe.state.T_odom_body.translation;
   }
   const LinkEnd& newest = state.nodes.back().end;
-  return keyframe.id == newest.id + 1 && keyframe.previous_utime != newest.filter.utime;
+  if (keyframe.id == newest.id + 1) return keyframe.previous_utime != newest.filter.utime;
+  return keyframe.id < newest.id && !comes_between(keyframe, state.nodes);
 }
 
 SolverOutcome append_keyframe(const Keyframe& keyframe, const BackendConfig& config, IncrementalSolver& solver,

@@ -15,8 +15,8 @@ namespace ignis {
 [[nodiscard]] KeyframeVerdict verdict_on(const Keyframe& keyframe, const SmootherState& state, std::string& reason);
 
 /// Whether the keyframe belongs to another drive although session and id fit: the front end was started anew and counts
-/// from 0 again. Another instant or pose than that of the node with its id, or another predecessor than the newest
-/// node.
+/// from 0 again. Another instant or pose than that of the node with its id, another predecessor than the newest node,
+/// or a stamp that no keyframe between its neighbours can have.
 [[nodiscard]] bool is_of_another_drive(const Keyframe& keyframe, const SmootherState& state);
 
 /// Adds the keyframe's variables and factors to the solver and a node to `state`. A refused keyframe leaves both as

@@ -15,6 +15,7 @@
 #include <numbers>
 
 #include "backend/gtsam_conversion.h"
+#include "backend/loose_odometry.h"
 #include "backend/open_shifts.h"
 #include "backend/preintegration.h"
 #include "backend/relative_pose_factor.h"
@@ -106,13 +107,6 @@ Eigen::Matrix3d open_between(const Pose& T_previous_this, const Matrix6d& scan_i
 }
 
 }  // namespace
-
-WhiteningRows loose_rows(const BackendConfig& config) {
-  Vector6d information;
-  information << Eigen::Vector3d::Constant(1.0 / square(config.loose_rotation_rad)),
-      Eigen::Vector3d::Constant(1.0 / square(config.loose_position_m));
-  return whitening(information.asDiagonal());
-}
 
 KeyframeLink first_link(const Keyframe& keyframe, const BackendConfig& config) {
   KeyframeLink link;

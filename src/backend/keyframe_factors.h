@@ -53,9 +53,6 @@ void add_link_factors(const KeyframeLink& link, const BackendConfig& config, gts
 /// Sets pose, velocity and biases of a keyframe. `state`: fields named odom are in map.
 void insert_estimate(std::int32_t id, const NavState& state, gtsam::Values& values);
 
-/// Whitening of loose odometry.
-[[nodiscard]] WhiteningRows loose_rows(const BackendConfig& config);
-
 /// Pose, velocity and biases of a keyframe (fields named odom are in map); the other fields keep their defaults.
 [[nodiscard]] NavState estimate_of(const gtsam::Values& values, std::int32_t id);
 [[nodiscard]] NavState estimate_of(IncrementalSolver& solver, std::int32_t id);

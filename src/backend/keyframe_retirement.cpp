@@ -124,7 +124,7 @@ Eigen::Vector<double, 9> motion_of(const NavState& state) {
 
 /// With both of its keyframes, of which either may be the later one.
 bool has_retired(const GraphLoop& loop, const SmootherState& state) {
-  return state.place_of(std::max(loop.result.from_id, loop.result.to_id)) < state.retired.count();
+  return ignis::has_retired(std::max(loop.result.from_id, loop.result.to_id), state);
 }
 
 void retire_loops(SmootherState& state, LoopEvents& events) {
@@ -157,12 +157,13 @@ void forget_waiting_loops(SmootherState& state, LoopEvents& events) {
 void thin_out(std::size_t until, const BackendConfig& config, IncrementalSolver& solver, SmootherState& state) {
   const std::vector<std::size_t> places = places_to_absorb(until, config, state);
   std::vector<gtsam::Key> keys;
+  std::vector<KeyframePose> poses;
   for (const std::size_t place : places) {
     keys.push_back(X(state.nodes[place].end.id));
-    state.absorbed.push_back(state.poses[place]);
+    poses.push_back(state.poses[place]);
   }
   solver.release(keys);
-  absorb(places, state);
+  state.absorbed_loops += absorb(places, poses, state);
 }
 
 }  // namespace
@@ -207,8 +208,12 @@ Matrix6d since_start(const Matrix6d& covariance, const SmootherState& state) {
 }
 
 std::optional<LoopResult> retired_loop(std::int32_t from_id, std::int32_t to_id, const SmootherState& state) {
-  if (are_retired(from_id, to_id, state) && (is_absorbed(from_id, state) || is_absorbed(to_id, state))) {
+  const bool both = has_retired(std::max(from_id, to_id), state);
+  if (both && (is_absorbed(from_id, state) || is_absorbed(to_id, state))) {
     LoopResult result;
+    result.utime = state.nodes.back().end.filter.utime;
+    result.stage = LoopStage::kKept;
+    result.reason = LoopReason::kKept;
     result.from_id = from_id;
     result.to_id = to_id;
     result.reason_text = "if there was one it stays, for both of its keyframes have retired";

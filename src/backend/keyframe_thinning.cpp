@@ -5,9 +5,10 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
+#include "backend/erase_places.h"
 #include "backend/information.h"
-#include "backend/place_list.h"
 #include "common/frames.h"
 
 namespace ignis {
@@ -17,8 +18,6 @@ namespace {
 constexpr double kSameHeading = std::numbers::pi / 4.0;
 // [keyframes] Those of one pass stay, close as they may be: together they are the map that a loop is matched with.
 constexpr std::int32_t kAnotherPass = 10;
-
-double heading(const Pose& T_map_body) { return frames::to_yaw_pitch_roll(T_map_body.rotation).yaw; }
 
 /// Ascending ids of the keyframes that loops in the graph, and verified ones outside of it, end at.
 std::vector<std::int32_t> ends_of_loops(const SmootherState& state) {
@@ -36,18 +35,18 @@ bool stands_for(const KeyframePose& earlier, const KeyframePose& later, const Ba
   const Pose& a = earlier.T_map_body;
   const Pose& b = later.T_map_body;
   if ((a.translation - b.translation).norm() > config.retired_spacing_m) return false;
-  return std::abs(std::remainder(heading(a) - heading(b), 2.0 * std::numbers::pi)) <= kSameHeading;
+  const double turn = frames::to_yaw_pitch_roll(b.rotation).yaw - frames::to_yaw_pitch_roll(a.rotation).yaw;
+  return std::abs(std::remainder(turn, 2.0 * std::numbers::pi)) <= kSameHeading;
 }
 
 /// Takes the places out of the blocks, and blocks of which nothing is left.
 void shorten(std::vector<RetiredBlock>& blocks, std::span<const std::size_t> places) {
-  std::size_t before = 0;
-  std::erase_if(blocks, [&](RetiredBlock& block) {
+  std::vector<RetiredBlock> left;
+  for (RetiredBlock& block : blocks) {
     block.until -= static_cast<std::size_t>(std::ranges::lower_bound(places, block.until) - places.begin());
-    const bool is_empty = block.until == before;
-    before = block.until;
-    return is_empty;
-  });
+    if (block.until > (left.empty() ? 0 : left.back().until)) left.push_back(block);
+  }
+  blocks = std::move(left);
 }
 
 /// What stays behind a gap is linked, in the exported graph, to what stays before it.
@@ -78,11 +77,10 @@ std::vector<std::size_t> places_to_absorb(std::size_t until, const BackendConfig
     const KeyframePose& pose = state.poses[i];
     const Eigen::Vector3d& position = pose.T_map_body.translation;
     const std::vector<std::size_t> around = near.around(position, config.retired_spacing_m);
-    const bool is_held = std::ranges::binary_search(held, pose.id);
-    if (!is_held && std::ranges::any_of(around, [&](std::size_t number) {
-          return stands_for(state.poses[staying[number]], pose, config);
-        })) {
-      found.push_back(i);
+    const auto stands = [&](std::size_t number) { return stands_for(state.poses[staying[number]], pose, config); };
+    if (std::ranges::any_of(around, stands)) {
+      // One that waits for its loops to retire must not stand for others meanwhile.
+      if (!std::ranges::binary_search(held, pose.id)) found.push_back(i);
       continue;
     }
     near.place(staying.size(), position);
@@ -91,8 +89,10 @@ std::vector<std::size_t> places_to_absorb(std::size_t until, const BackendConfig
   return found;
 }
 
-void absorb(std::span<const std::size_t> places, SmootherState& state) {
-  if (places.empty()) return;
+int absorb(std::span<const std::size_t> places, std::span<const KeyframePose> poses, SmootherState& state) {
+  if (places.empty()) return 0;
+  state.absorbed.insert(state.absorbed.end(), poses.begin(), poses.end());
+  std::ranges::sort(state.absorbed, {}, &KeyframePose::id);
   link_across(places, state);
   erase_places(state.nodes, places);
   erase_places(state.poses, places);
@@ -106,6 +106,7 @@ void absorb(std::span<const std::size_t> places, SmootherState& state) {
   std::erase_if(state.retired.loops, [&](const GraphLoop& loop) {
     return state.node_of(loop.result.from_id) == nullptr || state.node_of(loop.result.to_id) == nullptr;
   });
-  state.absorbed_loops += static_cast<int>(loops - state.retired.loops.size());
+  return static_cast<int>(loops - state.retired.loops.size());
 }
+
 }  // namespace ignis

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "common/frames.h"
@@ -16,8 +17,6 @@ double horizontal_distance(const Pose& a, const Pose& b) {
 }
 
 double heading(const Pose& T_map_body) { return frames::to_yaw_pitch_roll(T_map_body.rotation).yaw; }
-
-std::size_t distance_of_places(std::size_t a, std::size_t b) { return a > b ? a - b : b - a; }
 
 }  // namespace
 
@@ -66,7 +65,9 @@ std::vector<std::size_t> choose_candidates(std::span<const std::size_t> candidat
   std::vector<std::size_t> chosen = {candidates.front()};
   for (const std::size_t i : order) {
     if (chosen.size() == count) break;
-    const bool apart = std::ranges::all_of(chosen, [&](std::size_t c) { return distance_of_places(i, c) > spacing; });
+    const bool apart = std::ranges::all_of(chosen, [&](std::size_t c) {
+      return std::abs(poses[i].id - poses[c].id) > static_cast<std::int32_t>(spacing);
+    });
     if (apart) chosen.push_back(i);
   }
   return chosen;

@@ -40,8 +40,8 @@ struct CandidateSpace {
 [[nodiscard]] std::vector<std::size_t> loop_candidates(const CandidateSpace& space, const LoopGates& gates,
                                                        double sigmas, double most_m);
 
-/// Which candidates are worth a scan match: the oldest, then the nearest ones that lie more than `spacing` places away
-/// from those already chosen (their local maps would overlap), at most `count` in all.
+/// Which candidates are worth a scan match: the oldest, then the nearest ones that lie more than `spacing` keyframes
+/// away from those already chosen (their local maps would overlap), at most `count` in all.
 [[nodiscard]] std::vector<std::size_t> choose_candidates(std::span<const std::size_t> candidates,
                                                          std::span<const KeyframePose> poses,
                                                          const KeyframePose& current, std::size_t count,

@@ -12,8 +12,6 @@
 namespace ignis {
 namespace {
 
-constexpr std::int32_t kMostIdsApart = 3;  // of neighbours: keyframes that were lost on their way are no gap
-
 /// A candidate's surroundings.
 struct Surroundings {
   std::vector<std::vector<CloudPoint>> points;
@@ -28,15 +26,15 @@ struct Surroundings {
 };
 
 /// Clouds of the candidate and its neighbours in the candidate's frame. Never reaches the keyframe that looks, nor
-/// beyond those that were absorbed: what comes next then was seen elsewhere.
+/// beyond those that were absorbed: what comes next then was seen elsewhere, at another time.
 Surroundings surroundings_of(std::size_t candidate, std::size_t neighbours, SmootherState& state) {
   const std::size_t first = candidate > neighbours ? candidate - neighbours : 0;
   const std::size_t last = std::min(candidate + neighbours, state.poses.size() - 2);
   const Pose T_candidate_map = state.poses[candidate].T_map_body.inverse();
   Surroundings around;
   for (std::size_t i = first; i <= last; ++i) {
-    const auto ids_apart = std::abs(state.poses[i].id - state.poses[candidate].id);
-    if (ids_apart > kMostIdsApart * static_cast<std::int32_t>(neighbours)) continue;
+    const auto [earlier, later] = std::minmax(i, candidate);
+    if (were_absorbed_between(state.poses[earlier].id, state.poses[later].id, state)) continue;
     CloudLookup cloud = state.clouds.find(i);
     if (!cloud.problem.empty()) return {{}, {}, std::move(cloud.problem)};
     around.points.push_back(std::move(cloud.points));

@@ -5,7 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "backend/place_list.h"
+#include "backend/erase_places.h"
 #include "common/so3.h"
 
 namespace ignis {

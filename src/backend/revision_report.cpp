@@ -6,6 +6,7 @@
 #include <gtsam/nonlinear/Values.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "backend/axis_doubt.h"
 #include "backend/gtsam_conversion.h"
@@ -89,9 +90,9 @@ SmootherUpdate present_revision(IncrementalSolver& solver, const SmootherState& 
 }
 
 std::vector<KeyframePose> all_poses(const SmootherState& state) {
-  std::vector<KeyframePose> poses = state.poses;
-  poses.insert(poses.end(), state.absorbed.begin(), state.absorbed.end());
-  std::ranges::sort(poses, {}, &KeyframePose::id);
+  std::vector<KeyframePose> poses;
+  poses.reserve(state.poses.size() + state.absorbed.size());
+  std::ranges::merge(state.absorbed, state.poses, std::back_inserter(poses), {}, &KeyframePose::id, &KeyframePose::id);
   return poses;
 }
 

@@ -58,9 +58,8 @@ void measure_gap(const ShadowProblem::Graph& graph, const gtsam::Values& optimum
 }
 
 /// A variable of a keyframe that has retired, or has been absorbed since.
-bool has_retired(gtsam::Key key, const SmootherState& state) {
-  const auto id = static_cast<std::int32_t>(gtsam::Symbol(key).index());
-  return are_retired(id, id, state);
+bool is_of_retired(gtsam::Key key, const SmootherState& state) {
+  return has_retired(static_cast<std::int32_t>(gtsam::Symbol(key).index()), state);
 }
 
 /// The optimum as a starting point for the graph as it is by now: keyframes that came later keep their motion relative
@@ -88,7 +87,7 @@ std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optim
       values.update(key, gtsam::Vector3(T_new_old.rotation().matrix() * now.at<gtsam::Vector3>(key)));
     }
   }
-  for (const gtsam::Key key : solved.keys()) carried += !now.exists(key) && has_retired(key, state) ? 1 : 0;
+  for (const gtsam::Key key : solved.keys()) carried += !now.exists(key) && is_of_retired(key, state) ? 1 : 0;
   if (carried != solved.size()) return std::nullopt;
   return values;
 }

@@ -121,7 +121,7 @@ SmootherUpdate Smoother::add_loop(const LoopMeasurement& measurement) {
   if (!is_known(from, measurement.from_id) || !is_known(to, measurement.to_id) ||
       measurement.from_id == measurement.to_id) {
     result.reason_text = "the loop names keyframes that the graph does not hold";
-  } else if (are_retired(measurement.from_id, measurement.to_id, state)) {
+  } else if (has_retired(std::max(measurement.from_id, measurement.to_id), state)) {
     result.reason_text = "both of the loop's keyframes have retired";
   } else if (from == nullptr || to == nullptr) {
     result.reason_text = "one of the loop's keyframes has retired, and another stands for it";

@@ -135,11 +135,11 @@ class Smoother {
   [[nodiscard]] std::int32_t expected_id() const;
   [[nodiscard]] SmootherStats stats() const;
 
-  /// Poses, odometry and loops for keyframes.g2o.
+  /// Poses, odometry and loops for keyframes.g2o, without keyframes that were absorbed and their loops.
   [[nodiscard]] PoseGraph pose_graph() const;
 
   /// What changed since the previous call, as the next record for the archive. From here on the archive is taken to
-  /// have it, so the clouds in it may leave memory.
+  /// have it, so the clouds in it may leave memory. To be called after every change of the graph, or never.
   [[nodiscard]] std::vector<std::byte> take_change();
 
  private:

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "backend/loose_odometry.h"
+
 namespace ignis {
 
 const GraphNode* SmootherState::node_of(std::int32_t id) const {
@@ -17,12 +19,17 @@ std::size_t SmootherState::place_of(std::int32_t id) const {
 int keyframes_in(const SmootherState& state) { return static_cast<int>(state.nodes.size() + state.absorbed.size()); }
 
 bool is_absorbed(std::int32_t id, const SmootherState& state) {
-  return std::ranges::contains(state.absorbed, id, &KeyframePose::id);
+  return std::ranges::binary_search(state.absorbed, id, {}, &KeyframePose::id);
 }
 
-bool are_retired(std::int32_t a, std::int32_t b, const SmootherState& state) {
+bool were_absorbed_between(std::int32_t earlier, std::int32_t later, const SmootherState& state) {
+  const auto next = std::ranges::upper_bound(state.absorbed, earlier, {}, &KeyframePose::id);
+  return next != state.absorbed.end() && next->id < later;
+}
+
+bool has_retired(std::int32_t id, const SmootherState& state) {
   const std::size_t retired = state.retired.count();
-  return retired > 0 && std::max(a, b) <= state.nodes[retired - 1].end.id;
+  return retired > 0 && id <= state.nodes[retired - 1].end.id;
 }
 
 void follow_nodes(SmootherState& state, const BackendConfig& config) {

@@ -67,7 +67,7 @@ struct SmootherState {
   CloudStore clouds;                   ///< body frame, one per node
   std::vector<KeyframePose> poses;     ///< as the graph places them, one per node
   std::vector<Pose> published;         ///< as last listed in an update
-  std::vector<KeyframePose> absorbed;  ///< keyframes without a node: where they stay (keyframe_thinning.h)
+  std::vector<KeyframePose> absorbed;  ///< keyframes without a node: where they stay; ascending (keyframe_thinning.h)
   std::vector<GraphLoop> loops;        ///< in the graph
   std::vector<GraphLoop> waiting;      ///< verified, but outside of it
   std::vector<LoopVeto> vetoes;
@@ -98,8 +98,11 @@ struct SmootherState {
 /// Whether the graph knows the keyframe by its pose alone.
 [[nodiscard]] bool is_absorbed(std::int32_t id, const SmootherState& state);
 
-/// Whether both of them, which the graph has taken, are estimated no more.
-[[nodiscard]] bool are_retired(std::int32_t a, std::int32_t b, const SmootherState& state);
+/// Whether it knows any of those between two ids so.
+[[nodiscard]] bool were_absorbed_between(std::int32_t earlier, std::int32_t later, const SmootherState& state);
+
+/// Whether a keyframe, which the graph has taken, is estimated no more.
+[[nodiscard]] bool has_retired(std::int32_t id, const SmootherState& state);
 
 /// Brings what follows from nodes and poses up to date.
 void follow_nodes(SmootherState& state, const BackendConfig& config);

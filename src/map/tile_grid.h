@@ -69,7 +69,8 @@ struct Location {
 };
 
 /// Finds the cells of points. The cell of a coarser level follows from that of the local one, so that cells nest
-/// exactly whatever their sizes and the rounding. Most points are asked for on one level, hardly any on all three.
+/// exactly whatever their sizes and the rounding. Where windows slide, most points are asked for on one level, if at
+/// all.
 class PointLocator {
  public:
   explicit PointLocator(const TileGrid& grid);
@@ -128,7 +129,7 @@ class PointLocator {
   TileGrid grid_;
   double local_per_m_;
   double tiles_per_local_;
-  // Along one axis of a tile: which cell of the second level contains a cell of the first, not coarser one.
+  // Along one axis of a tile: which cell of the second level, the same or a coarser one, contains a cell of the first.
   std::array<std::array<std::vector<std::uint32_t>, kLevels>, kLevels> parents_;
 };
 

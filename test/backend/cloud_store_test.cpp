@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <random>
 
+#include "backend/erase_places.h"
 #include "backend/graph_change.h"
 #include "backend/memory_archive.h"
-#include "backend/place_list.h"
 #include "backend/text_contains.h"
 
 namespace ignis {

@@ -101,6 +101,9 @@ TEST(LoopDetector, ChoosesTheOldestThenTheNearestThatStandApart) {
   EXPECT_EQ(choose_candidates(candidates, poses, current, 4, 2), (std::vector<std::size_t>{0, 10, 7, 13}));
   EXPECT_EQ(choose_candidates(candidates, poses, current, 1, 2), (std::vector<std::size_t>{0}));
   EXPECT_TRUE(choose_candidates({}, poses, current, 4, 2).empty());
+  // Next to each other in the graph, since those between them were absorbed.
+  const std::vector<KeyframePose> two = {at(20, 1, 0, 0), at(35, 2, 0, 0)};
+  EXPECT_EQ(choose_candidates(std::vector<std::size_t>{0, 1}, two, current, 4, 2), (std::vector<std::size_t>{0, 1}));
 }
 
 }  // namespace

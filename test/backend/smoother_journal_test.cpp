@@ -277,6 +277,10 @@ TEST(SmootherJournalRecords, ARetirementThatCannotBeIsRefusedAndNamed) {
   EXPECT_TRUE(testing::contains(absorbing({4000}), "before its time")) << "nobody knows it";
   EXPECT_TRUE(testing::contains(absorbing({3, 1}), "not in order"));
   EXPECT_TRUE(testing::contains(absorbing({0, 1, 2, 3}), "a loop ends at")) << "of one that is estimated";
+  EXPECT_TRUE(
+      testing::contains(problem([](GraphChange& change) { change.state.absorbed_loops = 1'000; }), "more loops went"));
+  EXPECT_TRUE(
+      testing::contains(problem([](GraphChange& change) { change.state.absorbed_loops = -1; }), "more loops went"));
 }
 
 TEST(SmootherJournalRecords, HoldWhatTheFrontEndKnowsOfItsDrift) {
@@ -368,7 +372,7 @@ TEST(GraphChange, IsRefusedWhenANewKeyframeHasNoEstimateButAnotherHasTwo) {
   std::optional<GraphChange> change = decode_change(smoother.take_change());
   ASSERT_TRUE(change && change->linearised.size() == 2);
   change->linearised[1].id = change->linearised[0].id;
-  RestoredGraph graph;
+  RestoredGraph graph{BackendConfig()};
   EXPECT_EQ(graph.apply(std::move(*change)), "a new keyframe has no estimate");
   EXPECT_TRUE(graph.state.nodes.empty());
 }
