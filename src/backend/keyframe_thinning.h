@@ -17,13 +17,13 @@ namespace ignis {
 
 /// Places, ascending and below `until`, of keyframes that an earlier one stands for: no other stands for that one, it
 /// is within `retired_spacing_m`, looks the same way, and comes from another pass. Never one that a loop of the graph
-/// or one that waits ends at, nor one that a journal does not hold yet. `until`: at most as many as have retired, less
-/// the newest of them, which the chain hangs on.
+/// or one that waits ends at, nor one that a journal, if there is one, does not hold yet. `until`: at most as many as
+/// have retired, less the newest of them, which the chain hangs on.
 [[nodiscard]] std::vector<std::size_t> places_to_absorb(std::size_t until, const BackendConfig& config,
                                                         const SmootherState& state);
 
-/// Absorbs the keyframes at these places, ascending, which stay at `poses`, and the loops between them and others that
-/// have retired: how many. Places behind them move up. Requires follow_nodes().
+/// Absorbs the keyframes at these places, ascending, which stay at `poses` [m, map]. Places behind them move up.
+/// Returns how many loops, between them and others that have retired, went with them. Requires follow_nodes().
 int absorb(std::span<const std::size_t> places, std::span<const KeyframePose> poses, SmootherState& state);
 
 }  // namespace ignis

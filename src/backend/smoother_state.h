@@ -78,7 +78,7 @@ struct SmootherState {
   std::int32_t last_loop_id = -1;
   std::int32_t next_loop_number = 0;
   std::int32_t revision = 0;
-  int absorbed_loops = 0;  ///< loops that went with them
+  int absorbed_loops = 0;  ///< loops that went with absorbed keyframes
 
   // What follows from the above; brought up to date by follow_nodes().
   PlaceIndex places{kPlaceCell};
@@ -98,7 +98,7 @@ struct SmootherState {
 /// Whether the graph knows the keyframe by its pose alone.
 [[nodiscard]] bool is_absorbed(std::int32_t id, const SmootherState& state);
 
-/// Whether it knows any of those between two ids so.
+/// Whether any keyframe between these two ids is known by its pose alone.
 [[nodiscard]] bool were_absorbed_between(std::int32_t earlier, std::int32_t later, const SmootherState& state);
 
 /// Whether a keyframe, which the graph has taken, is estimated no more.
