@@ -342,8 +342,9 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
     // the gyro's, which is: the root lies between (docs/front_end_results.md, The heading of a young map). Gravity is
     // doubted by the smaller of the two: with the larger one sixteen beams lost their way.
     const double noise = std::sqrt(match.map_noise);
-    const Eigen::Matrix3d turn = drift_.add_scan(cautious_.topLeftCorner<6, 6>(), filter_.nominal.T_odom_body,
-                                                 match.map_age_scans / noise, blind_shifts(match.degeneracy));
+    const Eigen::Matrix3d turn =
+        drift_.add_scan(cautious_.topLeftCorner<6, 6>(), match.disagreement, filter_.nominal.T_odom_body,
+                        match.map_age_scans / noise, blind_shifts(match.degeneracy));
     turn_gravity(filter_.covariance, turn / noise);
     turn_gravity(cautious_, turn / noise);
   }

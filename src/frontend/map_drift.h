@@ -18,9 +18,9 @@ namespace ignis {
 ///
 /// A scan that enters the map carries the error of its pose with it. When the map's points are on average `age` scans
 /// old, a share of 1 / age of that error stays for good: e_k = mean(e_j over the last 2 x age scans) + n_k is a random
-/// walk with a step of n_k / age. Scans that meet the same planes share the planes' errors for about `age` scans, so
-/// the steps are not independent, and the variance of the walk grows by that number: by (covariance of the pose in the
-/// map) / age per scan.
+/// walk with a step of n_k / age. Steps are alike for as long as what makes them is, and the variance of the walk grows
+/// by that number of scans times n_k^2 / age^2. Noise is alike for some scans, since the filter averages over them.
+/// What the planes disagree by (plane_disagreement) is alike for as long as they are in sight, about `age` scans.
 ///
 /// Along a direction that no scan observes nothing is measured against the map: there the filter's covariance says it
 /// all while that lasts. Once structure comes back into view, that shrinks against planes which were shifted along with
@@ -35,11 +35,12 @@ class MapDrift {
   /// Begins at the first state: the frame is turned against the level one by what gravity's tilt in it may be.
   void begin(const FilterState& first);
 
-  /// A scan entered the map at a pose that is known in the map with `pose_covariance` (order of ErrorBlock), which is
-  /// made of points of the age `age_scans` on average. It did not observe shifts along the unit axes `blind` (odom).
-  /// What that adds to the covariance of the map's turn [rad^2, odom axes].
-  Eigen::Matrix3d add_scan(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans,
-                           std::span<const Eigen::Vector3d> blind);
+  /// A scan entered the map at a pose that is known in the map with `pose_covariance` and about which its planes
+  /// disagree by `disagreement` (both in the order of ErrorBlock). The map is made of points of the age `age_scans` on
+  /// average. The scan did not observe shifts along the unit axes `blind` (odom). What that adds to the covariance of
+  /// the map's turn [rad^2, odom axes].
+  Eigen::Matrix3d add_scan(const Matrix6d& pose_covariance, const Matrix6d& disagreement, const Pose& T_odom_body,
+                           double age_scans, std::span<const Eigen::Vector3d> blind);
 
   /// Remembers how well a position was known [m^2, odom axes, published covariance] when the map's scan number
   /// `scan` was placed there, and which shifts it did not observe. Numbers ascend; a smaller one begins a new map. Of

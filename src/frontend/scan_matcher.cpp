@@ -8,6 +8,7 @@
 
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
+#include "frontend/plane_jacobian.h"
 #include "frontend/rough_planes.h"
 #include "frontend/square_sum.h"
 
@@ -32,14 +33,6 @@ constexpr double kWeakShift = 0.02;
 constexpr float kPointsOfAMean = 5.0F;       // a voxel of fewer says less about a place than its neighbourhood does
 constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
 constexpr auto kAll = [](const auto&) { return true; };
-
-/// Inlined into the loops over the points: a call each would take as long as what it does.
-[[gnu::always_inline]] inline Vector6d jacobian(const Eigen::Matrix3d& R, const Eigen::Vector3d& point_body,
-                                                const Eigen::Vector3d& normal) {
-  Vector6d h;
-  h << point_body.cross(R.transpose() * normal), normal;
-  return h;
-}
 
 /// A step of its own from where the iterate is; false on numerical failure.
 bool take_step(FilterState& iterate, const PoseInformation& constraints) {
@@ -96,6 +89,8 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
     result.information_body.setZero();
     result.reliable = {};
     result.salient = {};
+  } else {
+    result.disagreement = disagreement(result.filter.nominal.T_odom_body);
   }
   const DegeneracyAnalysis open =
       without_known_shifts(degeneracy_, result.salient.constraints.information.bottomRightCorner<3, 3>(), kKnownShift);
@@ -180,12 +175,12 @@ ScanMatcher::Assessment ScanMatcher::assess(const FilterState& predicted) {
   SquareSum sensitivity;
   SquareSum normal_noise;
   for (const Constraint& constraint : constraints_) {
-    const Vector6d h = jacobian(R, constraint.point_body, constraint.plane.normal);
+    const Vector6d h = plane_jacobian(R, constraint.point_body, constraint.plane.normal);
     assessment.mean_innovation += std::abs(residual(R, pose.translation, constraint));
     assessment.observability += constraint.plane.normal.cwiseAbs2();
     sensitivity.add(h);
     for (int k = 0; k < 2; ++k) {
-      normal_noise.add(jacobian(R, constraint.point_body, constraint.plane.normal_sigma.col(k)));
+      normal_noise.add(plane_jacobian(R, constraint.point_body, constraint.plane.normal_sigma.col(k)));
     }
   }
   const double share = 1.0 / static_cast<double>(constraints_.size());
@@ -255,7 +250,7 @@ PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_c
   PoseInformation sum;
   for (const Constraint& constraint : constraints_) {
     if (!counts(constraint)) continue;
-    const Vector6d h = jacobian(R, constraint.point_body, constraint.plane.normal);
+    const Vector6d h = plane_jacobian(R, constraint.point_body, constraint.plane.normal);
     const double z = residual(R, pose.translation, constraint);
     const double weight = base_information * constraint.weight;
     // Most lie within the point's own noise already; what the pose adds to it need not be known then.

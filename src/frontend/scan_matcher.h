@@ -40,6 +40,8 @@ struct MatchResult {
   /// Mean age of the map points that the scan met. Times map_noise: all its scans share those errors, so that what one
   /// more of them adds is the part without.
   double map_age_scans = 1.0;
+  /// By how much its planes disagree on the pose, order of ErrorBlock; see plane_disagreement. Zero when not applied.
+  Matrix6d disagreement = Matrix6d::Zero();
 };
 
 /// Corrects a predicted state by matching deskewed points against planes of the local map: assessment, quality gate,
@@ -110,6 +112,7 @@ class ScanMatcher {
   /// Sums the constraints that `counts` says yes to and that lie within the gate.
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance, auto counts) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;
+  [[nodiscard]] Matrix6d disagreement(const Pose& pose) const;
   [[nodiscard]] ErrorCovariance considered() const;
   /// Steps along the degenerate directions: what certain points say there, then what little the rest does. The
   /// information of both; nothing on numerical failure.

@@ -74,12 +74,26 @@ TEST(MapDrift, GrowsWithEachScanByThePosesVarianceOverTheAgeOfTheMap) {
   drift.begin(first_state(Eigen::Vector2d::Zero()));
   Matrix6d covariance = 1e-6 * Matrix6d::Identity();
   covariance(kPosition + 2, kPosition + 2) = 1e-2;  // not observed
-  drift.add_scan(covariance, kStart, 10.0, {});
+  drift.add_scan(covariance, Matrix6d::Zero(), kStart, 10.0, {});
   EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 / 10.0, 1e-12);
   EXPECT_NEAR(published(drift, kStart)(kPosition + 2, kPosition + 2), 2.0 * 1e-2 / 10.0, 1e-9);
   EXPECT_NEAR(published(drift, kStart)(kAttitude, kAttitude), 2.0 * 1e-6 / 10.0, 1e-12);
-  drift.add_scan(covariance, kStart, 0.0, {});
+  drift.add_scan(covariance, Matrix6d::Zero(), kStart, 0.0, {});
   EXPECT_NEAR(published(drift, kStart)(kPosition, kPosition), 2.0 * 1e-6 * 1.1, 1e-12) << "at least one scan old";
+}
+
+TEST(MapDrift, NoiseIsLeftBehindLessByAnOldMapAndDisagreementAsLongAsItsPlanesAreMet) {
+  const Matrix6d some = 1e-6 * Matrix6d::Identity();
+  const Matrix6d none = Matrix6d::Zero();
+  const auto left_behind = [&](const Matrix6d& noise, const Matrix6d& disagreement, double age) {
+    MapDrift drift(1.0);
+    drift.begin(first_state(Eigen::Vector2d::Zero()));
+    drift.add_scan(noise, disagreement, kStart, age, {});
+    return published(drift, kStart)(kPosition, kPosition);
+  };
+  EXPECT_NEAR(left_behind(some, none, 100.0) / left_behind(some, none, 200.0), 4.0, 1e-9);
+  EXPECT_NEAR(left_behind(none, some, 100.0) / left_behind(none, some, 200.0), 2.0, 1e-9);
+  EXPECT_NEAR(left_behind(none, some, 100.0), 20.0 * 1e-6 / 100.0, 1e-12);
 }
 
 /// Published variance along Z of a drive that was known to 1 cm at scan 10, 1 m at scan 110 and 2 m at scan 210.
@@ -139,7 +153,7 @@ TEST(MapDrift, WhatNoScanObservedIsCountedOnceItIsMeasuredAgain) {
   double& along_variance = in_map(kPosition + 2, kPosition + 2);
   for (int scan = 1; scan <= 200; ++scan) {  // a corridor
     along_variance = 1e-4 * scan;
-    drift.add_scan(in_map, kStart, 10.0, along);
+    drift.add_scan(in_map, Matrix6d::Zero(), kStart, 10.0, along);
     drift.remember(scan, (in_map + published(drift, kStart)).bottomRightCorner<3, 3>(), kStart.translation, along);
   }
   EXPECT_LT(published(drift, kStart)(kPosition + 2, kPosition + 2), 1e-9) << "the filter's own covariance says it";

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "common/pose.h"
+
+namespace ignis {
+
+/// By how much the planes of a scan disagree on its pose, beyond what their noise explains: the part of the sandwich
+/// estimate of the pose's covariance, inverse(I) S inverse(I), that exceeds inverse(I), and nothing in directions where
+/// it does not. H. White, "A heteroskedasticity-consistent covariance matrix estimator and a direct test for
+/// heteroskedasticity", Econometrica 48(4), 1980.
+///
+/// `information` I: sum of w h h^T over the points, w = 1 / variance that each is given; `scatter` S: sum of
+/// w^2 z^2 h h^T, z what is left of its distance at the corrected pose. Both in the order of plane_jacobian. Directions
+/// of which hardly any point says something are taken for a little better known than they are. Positive semidefinite.
+[[nodiscard]] Matrix6d plane_disagreement(const Matrix6d& information, const Matrix6d& scatter);
+
+}  // namespace ignis
