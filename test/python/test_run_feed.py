@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The graph of a replay's folder as it leaves in MCAP, also where keyframes that others stand for are missing."""
 
+import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,7 @@ _SECONDS = range(6)  # a scan and a keyframe each, one metre apart
 def _run_folder(folder: Path, keyframes: list[int]) -> Path:
     """A replay straight on, in the graph of which only these keyframes are left."""
     folder.mkdir()
-    (folder / "report.json").write_text("{}")
+    (folder / "report.json").write_text(json.dumps({"log": "drive.lcm"}))
     (folder / "config.json").write_text("{}")
     for name, beside in (("eskf", 0.0), ("smoothed", 0.5)):
         rows = [f"{second}.0 {beside} 0 {-second} 0 0 0 1" for second in _SECONDS]
@@ -26,7 +28,7 @@ def _run_folder(folder: Path, keyframes: list[int]) -> Path:
     (folder / "eskf_states.csv").write_text("utime,trust\n0,0\n")
     (folder / "loops.csv").write_text("utime,from_id,to_id,reason\n5000000,5,0,accepted\n")
     lines = [f"VERTEX_SE3:QUAT {i} 0.25 0 {-i} 0 0 0 1" for i in keyframes]
-    pairs = list(zip(keyframes[:-1], keyframes[1:], strict=True))
+    pairs = list(pairwise(keyframes))
     lines += [f"EDGE_SE3:QUAT {a} {b} 0 0 {a - b} 0 0 0 1" for a, b in pairs]
     lines += ["# loop", "EDGE_SE3:QUAT 0 5 0 0 -5 0 0 0 1"]
     (folder / "keyframes.g2o").write_text("\n".join(lines) + "\n")
