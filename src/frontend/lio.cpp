@@ -342,11 +342,13 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
     // the gyro's, which is: the root lies between (docs/front_end_results.md, The heading of a young map). Gravity is
     // doubted by the smaller of the two: with the larger one sixteen beams lost their way.
     const double noise = std::sqrt(match.map_noise);
-    const Eigen::Matrix3d turn =
-        drift_.add_scan(cautious_.topLeftCorner<6, 6>(), match.disagreement, filter_.nominal.T_odom_body,
-                        match.map_age_scans / noise, blind_shifts(match.degeneracy));
-    turn_gravity(filter_.covariance, turn / noise);
-    turn_gravity(cautious_, turn / noise);
+    const double age = match.map_age_scans / noise;
+    const Pose& T_odom_body = filter_.nominal.T_odom_body;
+    const Matrix6d in_map = cautious_.topLeftCorner<6, 6>();
+    drift_.add_scan(in_map, match.disagreement, T_odom_body, age, blind_shifts(match.degeneracy));
+    const Eigen::Matrix3d bend = drift_.bend(in_map, T_odom_body, age) / noise;
+    turn_gravity(filter_.covariance, bend);
+    turn_gravity(cautious_, bend);
   }
   grow_map(cloud, match);
 }

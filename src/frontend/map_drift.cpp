@@ -13,9 +13,9 @@ constexpr int kScansBetweenPlacements = 10;  // half a second
 constexpr std::size_t kMostPlacements = 150;
 // Both were looked for with `map_drift`, over the heading of four scenes (docs/front_end_results.md, What a scan leaves
 // behind). Noise of the pose counts in full while the map is young, where all scans meet the same few points.
-constexpr double kAgeOfAYoungMap = 20.0;  // scans
+constexpr double kAgeOfAYoungMap = 12.0;  // scans
 // A plane of the map is met by many points of a scan, whose errors are then one.
-constexpr double kPointsThatShareAnError = 20.0;
+constexpr double kPointsThatShareAnError = 14.0;
 
 /// Takes an error of (attitude in body axes, position in odom axes) to one with both in odom axes.
 Matrix6d attitude_to_odom(const Pose& T_odom_body) {
@@ -38,17 +38,20 @@ void MapDrift::begin(const FilterState& first) {
   position_ = start_;
 }
 
-Eigen::Matrix3d MapDrift::add_scan(const Matrix6d& pose_covariance, const Matrix6d& disagreement,
-                                   const Pose& T_odom_body, double age_scans, std::span<const Eigen::Vector3d> blind) {
+void MapDrift::add_scan(const Matrix6d& pose_covariance, const Matrix6d& disagreement, const Pose& T_odom_body,
+                        double age_scans, std::span<const Eigen::Vector3d> blind) {
   Matrix6d measured = attitude_to_odom(T_odom_body);
   measured.bottomRightCorner<3, 3>() -= projector_on(blind);
   carry_to(T_odom_body.translation);
   const double age = std::max(age_scans, 1.0);
   const Matrix6d stays =
       std::min(kAgeOfAYoungMap / age, 1.0) * pose_covariance + kPointsThatShareAnError * disagreement;
-  const Matrix6d added = scale_ / age * measured * stays * measured.transpose();
-  covariance_ += added;
-  return added.topLeftCorner<3, 3>();
+  covariance_ += scale_ / age * measured * stays * measured.transpose();
+}
+
+Eigen::Matrix3d MapDrift::bend(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans) const {
+  const Eigen::Matrix3d R = T_odom_body.rotation.toRotationMatrix();
+  return scale_ / std::max(age_scans, 1.0) * R * pose_covariance.topLeftCorner<3, 3>() * R.transpose();
 }
 
 void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,

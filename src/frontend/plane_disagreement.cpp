@@ -39,7 +39,10 @@ Matrix6d ScanMatcher::disagreement(const Pose& pose) const {
     information.add(h, weight);
     scatter.add(h, weight * weight * z * z);
   }
-  return plane_disagreement(information.matrix(), scatter.matrix());
+  // Along a blind direction a few planes that are none make up what little there is.
+  const Matrix6d& observed = degeneracy_.projector;
+  return plane_disagreement(observed.transpose() * information.matrix() * observed,
+                            observed.transpose() * scatter.matrix() * observed);
 }
 
 }  // namespace ignis
