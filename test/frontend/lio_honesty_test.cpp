@@ -68,5 +68,24 @@ TEST(LioHonesty, ErrorsOfFiveDrivesAreWhatTheCovarianceSays) {
   EXPECT_LT(mean.nis, 1.0);
 }
 
+/// Published variance of the position on the ground at the end [m^2], when for three seconds of the drive what lies to
+/// the left and to the right is seen closer by than it is, by this share.
+double variance_after_squeezed_scans(double share) {
+  Drive drive = test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 18.0, Sensors{}, 1);
+  for (Scan& scan : drive.scans) {
+    const double now = test::drive_seconds(drive, scan.end_utime());
+    if (now < 10.0 || now > 13.0) continue;
+    for (ScanPoint& point : scan.points) point.position.x() *= static_cast<float>(1.0 - share);
+  }
+  const test::LioRun run = test::run_lio(test::tuned_config(), drive);
+  EXPECT_EQ(run.scans.back().stats.session, 0);
+  const auto variance = run.scans.back().covariance.diagonal();
+  return variance[kPosition] + variance[kPosition + 2];
+}
+
+TEST(LioHonesty, WhatWasMappedWhileItsPlanesContradictedEachOtherStaysInTheCovariance) {
+  EXPECT_GT(variance_after_squeezed_scans(0.03), 2.0 * variance_after_squeezed_scans(0.0));
+}
+
 }  // namespace
 }  // namespace ignis

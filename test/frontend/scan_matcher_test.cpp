@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -103,6 +104,20 @@ TEST_F(CorridorEnd, IsLeftOutWhenItWasMappedBeforeThePoseCouldMoveAgainstIt) {
 TEST_F(CorridorEnd, IsTakenForChanceBelowTheShareThatIsAskedFor) {
   config_.salient_share = 0.5;
   EXPECT_EQ(match().salient.constraints.count, 0);
+}
+
+TEST_F(CorridorEnd, ThatContradictsItselfIsNoDisagreementAboutAnAxisThatIsNotObserved) {
+  config_.degeneracy_signal_to_noise = 100.0;
+  for (std::vector<Eigen::Vector3f>& scan : scans_) {
+    float off = 0.14F;
+    for (Eigen::Vector3f& point : scan) {
+      if (point.z() < -7.0F) point.z() += std::exchange(off, -off);
+    }
+  }
+  const MatchResult result = match(map_.scans() + 1);
+  ASSERT_TRUE(result.stats.applied());
+  EXPECT_EQ(result.stats.degenerate_directions, 1);
+  EXPECT_LT(result.disagreement(kPosition + 2, kPosition + 2), 1e-9);
 }
 
 /// A floor of squares of a metre, every other one of which, or each, is rough and was mapped too high.
@@ -243,6 +258,28 @@ TEST(RoughPlanes, LieWhereTheVoxelOfThePointSaysAndNotWhereItsNeighboursDo) {
   const double by_all_neighbours = height_over_strips(0.0);
   EXPECT_GT(by_all_neighbours, 0.008);
   EXPECT_LT(std::abs(height_over_strips(0.005)), 0.4 * by_all_neighbours);
+}
+
+/// A floor and four walls, of which the two across X are seen closer to each other than they were mapped, by twice
+/// `squeeze` [m].
+MatchResult match_between_walls_closer_by(float squeeze) {
+  std::vector<Eigen::Vector3f> mapped;
+  std::vector<Eigen::Vector3f> seen;
+  for_each_point_of_a_floor([&](float x, float z, int, int) { mapped.emplace_back(x, -1.0F, z); });
+  seen = mapped;
+  add_walls(mapped, seen);
+  for (Eigen::Vector3f& point : seen) {
+    if (std::abs(point.x()) > 2.0F) point.x() -= std::copysign(squeeze, point.x());
+  }
+  return match_at_rest(test::tuned_config(), mapped, seen, 1e-4);
+}
+
+TEST(Disagreement, IsAlongTheAxisAcrossWhichTwoWallsContradictEachOther) {
+  const Vector6d none = match_between_walls_closer_by(0.0F).disagreement.diagonal();
+  const Vector6d squeezed = match_between_walls_closer_by(0.15F).disagreement.diagonal();
+  EXPECT_EQ(none.maxCoeff(), 0.0);
+  EXPECT_GT(squeezed[kPosition], 1e-7);
+  EXPECT_LT(squeezed[kPosition + 1] + squeezed[kPosition + 2], 0.01 * squeezed[kPosition]);
 }
 
 }  // namespace
