@@ -18,7 +18,7 @@ constexpr double kLeastInformation = 1e-4;
 Matrix6d plane_disagreement(const Matrix6d& information, const Matrix6d& scatter) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> axes(information);
   const Vector6d known = axes.eigenvalues().cwiseMax(kLeastInformation * axes.eigenvalues()[5]);
-  if (!(known[0] > 0.0)) return Matrix6d::Zero();
+  if (!(known[0] > 0.0) || !scatter.allFinite()) return Matrix6d::Zero();
   // In units of what the scan is told to know, noise makes the identity or less.
   const Matrix6d to_sigmas = axes.eigenvectors() * known.cwiseSqrt().cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> scattered(to_sigmas.transpose() * scatter * to_sigmas);

@@ -112,6 +112,7 @@ class ScanMatcher {
   /// Sums the constraints that `counts` says yes to and that lie within the gate.
   [[nodiscard]] PoseInformation accumulate(const Pose& pose, const Matrix6d& pose_covariance, auto counts) const;
   [[nodiscard]] double mean_residual(const Pose& pose) const;
+  /// Of the planes about the corrected pose, but not along blind directions.
   [[nodiscard]] Matrix6d disagreement(const Pose& pose) const;
   [[nodiscard]] ErrorCovariance considered() const;
   /// Steps along the degenerate directions: what certain points say there, then what little the rest does. The

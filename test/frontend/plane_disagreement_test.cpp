@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -62,7 +63,7 @@ double largest(const Matrix6d& covariance) {
 TEST(PlaneDisagreement, IsLittleOfWhatIsToldWhereDistancesAreNoise) {
   std::mt19937 random(1);
   const double told = kNoise * kNoise / (kPoints / 3.0);  // of a shift [m^2]
-  for (int drive = 0; drive < 20; ++drive) {
+  for (int draw = 0; draw < 20; ++draw) {
     const std::vector<Vector6d> jacobians = jacobians_of_a_room(random);
     EXPECT_LT(largest(disagreement_of(jacobians, noisy_distances(random))), 0.4 * told);
   }
@@ -72,7 +73,7 @@ TEST(PlaneDisagreement, IsWhatTheSandwichSaysBeyondTheNoiseWhereTwoWallsContradi
   std::mt19937 random(2);
   const std::vector<Vector6d> jacobians = jacobians_of_a_room(random);
   std::vector<double> distances(kPoints, 0.0);
-  constexpr double kApart = 0.1;  // m: the walls across X have come closer by twice that
+  constexpr double kApart = 0.05;  // m: the walls across X have come closer by twice that
   for (int i = 0; i < kPoints; i += 3) distances[i] = i % 2 == 0 ? kApart : -kApart;
   const Matrix6d disagreement = disagreement_of(jacobians, distances);
   // N points of the same weight along one axis: the sandwich is z^2 / N, the noise sigma^2 / N.
@@ -102,6 +103,8 @@ TEST(PlaneDisagreement, IsACovarianceWhateverThePointsSay) {
     EXPECT_GT(solver.eigenvalues()[0], -1e-9 * (1.0 + disagreement.norm()));
   }
   EXPECT_EQ(plane_disagreement(Matrix6d::Zero(), Matrix6d::Zero()), Matrix6d::Zero());
+  const Matrix6d no_number = Matrix6d::Constant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(plane_disagreement(Matrix6d::Identity(), no_number), Matrix6d::Zero());
 }
 
 }  // namespace
