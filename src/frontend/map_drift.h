@@ -29,7 +29,7 @@ namespace ignis {
 /// Kept as the covariance of (turn of the map about the body, shift), both in odom axes, at the present position.
 class MapDrift {
  public:
-  /// `scale`: factor on the variance that a scan leaves behind.
+  /// `scale`: factor on the variance that a scan leaves behind, and on that by which the map may bend.
   explicit MapDrift(double scale) : scale_(scale) {}
 
   /// Begins at the first state: the frame is turned against the level one by what gravity's tilt in it may be.
