@@ -9,7 +9,6 @@
 namespace ignis {
 namespace {
 
-constexpr int kScansBetweenPlacements = 10;  // half a second
 constexpr std::size_t kMostPlacements = 150;
 // Both were looked for over twelve drives each of four scenes, with 550 points a scan, until the NEES of position and
 // attitude were nearest to one (docs/front_end_results.md, What a scan leaves behind).
@@ -58,7 +57,7 @@ void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance, co
                         std::span<const Eigen::Vector3d> blind) {
   view_.remember(position_covariance, blind);
   if (!placements_.empty() && scan < placements_.back().scan) placements_.clear();
-  if (!placements_.empty() && scan < placements_.back().scan + kScansBetweenPlacements) return;
+  if (!placements_.empty() && scan == placements_.back().scan) return;  // did not enter the map
   placements_.push_back({scan, position_covariance, position_covariance - shift_by_tilt(position)});
   if (placements_.size() > kMostPlacements) forget_one();
 }
@@ -85,7 +84,9 @@ int MapDrift::sure_since(const Eigen::Matrix3d& position_covariance, const Eigen
     return (in_map - then.in_map).diagonal().maxCoeff() > sigma_m * sigma_m;
   };
   const auto last_doubtful = std::ranges::find_if(placements_.rbegin(), placements_.rend(), doubtful);
-  return last_doubtful == placements_.rend() ? 0 : last_doubtful->scan + 1;
+  if (last_doubtful == placements_.rend()) return 0;
+  const auto first_sure = last_doubtful.base();
+  return first_sure == placements_.end() ? placements_.back().scan + 1 : first_sure->scan;
 }
 
 void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body) {

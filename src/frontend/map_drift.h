@@ -47,8 +47,9 @@ class MapDrift {
   [[nodiscard]] Eigen::Matrix3d bend(const Matrix6d& pose_covariance, const Pose& T_odom_body, double age_scans) const;
 
   /// Remembers how well a position was known [m^2, odom axes, published covariance] when the map's scan number
-  /// `scan` was placed there, and which shifts it did not observe. Numbers ascend; a smaller one begins a new map. Of
-  /// what is old only some are kept.
+  /// `scan` was placed there, and which shifts it did not observe. Numbers ascend; a smaller one begins a new map, the
+  /// same one again is of a scan that did not enter it. Of what is old only some are kept, of the newest all: without
+  /// scans metres of uncertainty can lie between one and the next.
   void remember(int scan, const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
                 std::span<const Eigen::Vector3d> blind);
 
@@ -59,7 +60,8 @@ class MapDrift {
 
   /// The first scan whose planes are sure to be the ones that are met now: since then the position, of which
   /// `position_covariance` is published now, has become less certain by no more than `sigma_m` along any axis. The tilt
-  /// of the start does not count: it turns the map as a whole.
+  /// of the start does not count: it turns the map as a whole. Of those that are not remembered none is sure that came
+  /// before one that is.
   [[nodiscard]] int sure_since(const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
                                double sigma_m) const;
 
@@ -99,7 +101,7 @@ class MapDrift {
   Eigen::Matrix3d start_tilt_ = Eigen::Matrix3d::Zero();  ///< of the frame against the level one [rad^2]
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
   RegainedView view_;                 ///< since the last scan, with the published position
-  std::deque<Placement> placements_;  ///< every tenth scan at first, the older the fewer; oldest first
+  std::deque<Placement> placements_;  ///< every scan at first, the older the fewer; oldest first
 
   friend void transfer(auto& io, FieldsOf<MapDrift> auto& drift) {
     io.matrix(drift.covariance_);

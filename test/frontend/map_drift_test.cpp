@@ -149,9 +149,30 @@ TEST_F(Drifted, APlaneOfTheNewestScansIsHeldToTheNewestThatIsRemembered) {
 TEST_F(Drifted, PlanesAreSureSinceThePositionWasAsWellKnownAsNow) {
   const Eigen::Matrix3d now = 4.01 * Eigen::Matrix3d::Identity();
   EXPECT_EQ(drift.sure_since(now, kStart.translation, 3.0), 0) << "within three metres all of them";
-  EXPECT_EQ(drift.sure_since(now, kStart.translation, 1.9), 11);
-  EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.15), 111);
-  EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.05), 211);
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 1.9), 110) << "what came between may be as vague as scan 10";
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.15), 210);
+  EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.05), 211) << "none";
+}
+
+TEST_F(Drifted, AScanThatDoesNotEnterTheMapPlacesNothing) {
+  drift.remember(210, 9.0 * Eigen::Matrix3d::Identity(), kStart.translation, {});
+  drift.hold_to(210.0, along, kStart);
+  EXPECT_NEAR(variances().z(), 4.0, 1e-12);
+}
+
+TEST(MapDrift, KnowsToTheScanWhereAGapInTheDriveLies) {
+  MapDrift drift(1.0);
+  drift.begin(first_state(Eigen::Vector2d::Zero()));
+  for (int scan = 1; scan <= 37; ++scan) {
+    const double variance = scan < 37 ? 1e-4 : 1.0;  // metres come together without scans
+    drift.remember(scan, variance * Eigen::Matrix3d::Identity(), kStart.translation, {});
+  }
+  EXPECT_EQ(drift.sure_since(1.1 * Eigen::Matrix3d::Identity(), kStart.translation, 0.5), 37);
+  const std::array<Eigen::Vector3d, 1> along{Eigen::Vector3d::UnitZ()};
+  drift.hold_to(36.0, along, kStart);
+  EXPECT_NEAR(published(drift, kStart)(kPosition + 2, kPosition + 2), 1e-4, 1e-12) << "from before it";
+  drift.hold_to(36.5, along, kStart);
+  EXPECT_NEAR(published(drift, kStart)(kPosition + 2, kPosition + 2), 1.0, 1e-12) << "from behind it, in part";
 }
 
 TEST(MapDrift, WhatNoScanObservedIsCountedOnceItIsMeasuredAgain) {
