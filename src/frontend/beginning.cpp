@@ -79,6 +79,7 @@ void Lio::start(const FilterState& first) {
   cautious_ = filter_.covariance;
   live_ = filter_.nominal;
   running_ = true;
+  last_correction_ = first.nominal.utime;
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
   if (!start_note_.empty()) trust_.note_uncertain_start("new session", kScansToConfirmSession);

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <utility>
 
-#include "frontend/reacquisition.h"
 #include "frontend/scan_instant.h"
 #include "frontend/voxel_downsample.h"
 
@@ -62,7 +61,7 @@ void Lio::reset() {
   mapped_velocity_variance_ = 0.0;
   applied_scans_ = 0;
   contradictions_ = 0;
-  scans_without_correction_ = 0;
+  last_correction_.reset();
   trust_ = TrustMonitor(config_);
   opinion_ = SecondOpinion(config_);
   last_clipped_.reset();
@@ -265,72 +264,13 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   }
   result.trust = trust_.trust();
   if (velocity_known_) {
-    result.keyframe =
-        keyframer_.add_scan(published, match.information_body, blind, std::move(sparse), !trust_.awaits_confirmation());
+    std::vector<Eigen::Vector3d> untold = blind;
+    for (const Eigen::Vector3d& axis : match.doubtful) add_axis(untold, axis);
+    result.keyframe = keyframer_.add_scan(published, match.information_body, untold, std::move(sparse),
+                                          !trust_.awaits_confirmation());
   }
   result.cloud = std::move(cloud);
   return result;
-}
-
-/// `age` [s] is that of the points in the mean: of the position at that instant the scan tells.
-MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse, double age) {
-  MatchResult result;
-  result.filter = filter_;
-  if (std::ssize(cloud) < config_.min_scan_points) {
-    result.stats.reason = ScanReason::kTooFewPoints;
-  } else if (!config_.use_scan_matching) {
-    result.stats.reason = ScanReason::kMatchingDisabled;
-  } else if (map_.empty()) {
-    result.stats.reason = ScanReason::kMapEmpty;
-  } else {
-    const bool is_large = std::ssize(cloud) > config_.max_scan_points;
-    every_nth(is_large ? sparse : cloud, config_.max_scan_points, match_points_);
-    const Pose T_start =
-        has_to_search() ? reacquire(filter_, match_points_, map_, config_) : filter_.nominal.T_odom_body;
-    const int salient_since = sure_since(config_.match_radius_m);
-    const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
-    result = matcher_.match(seen, T_start, match_points_, map_, salient_since);
-    const Eigen::Vector3d gained = result.filter.nominal.v_odom - filter_.nominal.v_odom;
-    result.filter.nominal.T_odom_body.translation += age * gained;
-    result.filter.covariance = with_position_at(result.filter.covariance, age);
-  }
-  return result;
-}
-
-/// The map may lie farther from the points than the matcher sees: nothing was corrected for a while, or the velocity of
-/// a moving start is not known yet.
-bool Lio::has_to_search() const {
-  const double sees = std::max(config_.match_radius_m, config_.wide_match_radius_m);
-  return scans_without_correction_ >= kScansUntilReacquisition ||
-         (!velocity_known_ && filter_.covariance.diagonal().segment<3>(kPosition).maxCoeff() > sees * sees);
-}
-
-/// The first scan of the map since which the position has become less certain by no more than `sigma_m`.
-int Lio::sure_since(double sigma_m) const {
-  const Pose& T_odom_body = filter_.nominal.T_odom_body;
-  const Matrix6d pose_covariance = cautious_.topLeftCorner<6, 6>() + drift_.pose_covariance(T_odom_body);
-  return drift_.sure_since(pose_covariance.bottomRightCorner<3, 3>(), T_odom_body.translation, sigma_m);
-}
-
-void Lio::count_correction(const MatchResult& match, double age) {
-  if (!match.stats.applied()) {
-    ++scans_without_correction_;
-    return;
-  }
-  ++applied_scans_;
-  scans_without_correction_ = 0;
-  ErrorCovariance seen = with_position_at(cautious_, -age);
-  const UpdateStep update = information_update(seen, ErrorVector::Zero(), match.reliable, match.considered);
-  if (update.ok) seen = update.covariance;
-  const bool salient = match.salient.constraints.count > 0;
-  const UpdateStep along =
-      salient ? information_update(seen, ErrorVector::Zero(), match.salient.constraints) : UpdateStep{};
-  if (along.ok) seen = along.covariance;
-  cautious_ = with_position_at(seen, age);
-  const Pose& T_odom_body = filter_.nominal.T_odom_body;
-  const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
-  drift_.hand_over(blind, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
-  if (salient) drift_.hold_to(match.salient.mean_scan, blind, T_odom_body);
 }
 
 /// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.
@@ -372,7 +312,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& matc
 void Lio::begin_new_map() {
   map_.clear();
   contradictions_ = 0;
-  scans_without_correction_ = 0;
+  last_correction_ = filter_.nominal.utime;
   ++session_;
   session_end_.reset();
   keyframer_ = Keyframer(config_, session_);

@@ -15,6 +15,7 @@
 #include "frontend/keyframer.h"
 #include "frontend/local_map.h"
 #include "frontend/map_drift.h"
+#include "frontend/reacquisition.h"
 #include "frontend/scan_matcher.h"
 #include "frontend/scan_selection.h"
 #include "frontend/scan_stats.h"
@@ -103,8 +104,10 @@ class Lio {
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
                                     double age);
-  [[nodiscard]] bool has_to_search() const;
+  [[nodiscard]] Reacquisition place_to_begin() const;
   [[nodiscard]] int sure_since(double sigma_m) const;
+  /// [m^2] odom axes.
+  [[nodiscard]] Eigen::Matrix3d published_position_covariance() const;
   void count_correction(const MatchResult& match, double age);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
@@ -141,7 +144,7 @@ class Lio {
     Utime utime = 0;  ///< the first sample behind it is the last one
   };
 
-  static constexpr int kScansUntilReacquisition = 5;  ///< without a correction
+  static constexpr double kSecondsUntilReacquisition = 0.27;  ///< without a correction: five scans of an L1
 
   FrontendConfig config_;
   std::int32_t session_ = 0;
@@ -172,7 +175,7 @@ class Lio {
   double mapped_velocity_variance_ = 0.0;  ///< [m^2/s^2] with which the points of the map were deskewed, in the mean
   int applied_scans_ = 0;
   int contradictions_ = 0;                ///< in a row
-  int scans_without_correction_ = 0;      ///< in a row
+  std::optional<Utime> last_correction_;  ///< none: nobody knows how far the map lies from the points
   std::optional<Utime> last_standstill_;  ///< instant of the last correction to zero velocity
   std::optional<Utime> last_clipped_;     ///< instant of the newest sample that says nothing about the biases
   std::optional<Utime> resumed_from_;     ///< newest sample of the predecessor, until the first own one
@@ -201,7 +204,7 @@ class Lio {
     io.number(lio.mapped_velocity_variance_);
     io.number(lio.applied_scans_);
     io.number(lio.contradictions_);
-    io.number(lio.scans_without_correction_);
+    io.maybe(lio.last_correction_);
     io.maybe(lio.last_standstill_);
     io.maybe(lio.last_clipped_);
   }

@@ -106,6 +106,13 @@ void MapDrift::hand_over(std::span<const Eigen::Vector3d> blind, const Pose& T_o
   shift = view_.widened(shift, blind, in_map);
 }
 
+void MapDrift::doubt(const Eigen::Matrix3d& position_covariance, std::span<const Eigen::Vector3d> axes,
+                     const Pose& T_odom_body, const Eigen::Matrix3d& in_map) {
+  carry_to(T_odom_body.translation);
+  auto shift = covariance_.bottomRightCorner<3, 3>();
+  shift = widened_to(position_covariance, shift, in_map, axes);
+}
+
 Eigen::Matrix3d MapDrift::shift_since_start(const Eigen::Vector3d& position) const {
   return at(position).bottomRightCorner<3, 3>() - shift_by_tilt(position);
 }

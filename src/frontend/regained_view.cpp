@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/regained_view.h"
 
-#include <vector>
-
 #include <Eigen/Eigenvalues>
 
 namespace ignis {
 namespace {
 
 constexpr double kRegained = 1e-3;  // squared sine of an angle of two degrees between what was and what is not observed
+constexpr double kMostlyAcross = 0.7;  // sine of the angle between an axis and those that there are
 
 }  // namespace
 
@@ -27,6 +26,11 @@ Eigen::Matrix3d RegainedView::widened(const Eigen::Matrix3d& shift, std::span<co
     if (regained.eigenvalues()[k] > kRegained) axes.emplace_back(regained.eigenvectors().col(k));
   }
   return widened_to(position_covariance_, shift, in_map, axes);
+}
+
+void add_axis(std::vector<Eigen::Vector3d>& axes, Eigen::Vector3d axis) {
+  axis -= projector_on(axes) * axis;
+  if (axis.norm() > kMostlyAcross) axes.push_back(axis.normalized());
 }
 
 Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -37,6 +38,9 @@ class RegainedView {
     io.matrix(view.blind_);
   }
 };
+
+/// Adds the part of a unit axis that is across to orthonormal `axes`, unless it is the smaller one.
+void add_axis(std::vector<Eigen::Vector3d>& axes, Eigen::Vector3d axis);
 
 /// Onto the space that orthonormal `axes` span.
 [[nodiscard]] Eigen::Matrix3d projector_on(std::span<const Eigen::Vector3d> axes);

@@ -21,7 +21,7 @@ constexpr double kLongestSilence = 3.0;          // s: the longest that is bridg
 void Lio::resume() {
   resumed_from_ = imu_.newest();
   unaided_ = filter_;
-  scans_without_correction_ = kScansUntilReacquisition;
+  last_correction_.reset();
   trust_.note_resumption();
   start_note_ = std::format("going on with session {}", session_);
 }
@@ -51,7 +51,7 @@ Lio::Silence Lio::bridge_silence(Utime before, Utime sample, std::vector<ScanRes
   keyframer_.note_gap();
   unaided_ = filter_;
   confirm_until_ = sample + to_micros(kConfirmationSeconds);
-  scans_without_correction_ = kScansUntilReacquisition;
+  last_correction_.reset();
   trust_.note_resumption();
   return Silence::kBridged;
 }
@@ -90,7 +90,7 @@ void Lio::seek_confirmation(ScanReason reason) {
   contradictions_ = 0;
   filter_ = *unaided_;
   cautious_ = unaided_->covariance;
-  scans_without_correction_ = kScansUntilReacquisition;
+  last_correction_.reset();
   trust_.note_resumption();
 }
 

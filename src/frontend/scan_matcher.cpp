@@ -9,6 +9,7 @@
 #include "common/plane_smoothness.h"
 #include "common/so3.h"
 #include "frontend/plane_jacobian.h"
+#include "frontend/regained_view.h"
 #include "frontend/rough_planes.h"
 #include "frontend/square_sum.h"
 
@@ -57,8 +58,10 @@ ScanMatcher::ScanMatcher(const FrontendConfig& config)
 }
 
 MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start,
-                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since) {
+                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since,
+                               std::span<const Eigen::Vector3d> doubtful) {
   salient_since_ = salient_since;
+  doubtful_.assign(doubtful.begin(), doubtful.end());
   speed_is_known_ = largest_sigma(predicted.covariance, kVelocity) < kKnownSpeed;
   expect(predicted);
   MatchResult result;
@@ -268,6 +271,10 @@ ErrorCovariance ScanMatcher::considered() const {
   ErrorCovariance blind = ErrorCovariance::Zero();
   blind.topLeftCorner<6, 6>() = degeneracy_.blind_part;
   blind.block<3, 3>(kVelocity, kVelocity) = degeneracy_.blind_part.bottomRightCorner<3, 3>();
+  if (doubtful_.empty()) return blind;
+  std::vector<Eigen::Vector3d> axes = blind_shifts(degeneracy_);
+  for (const Eigen::Vector3d& axis : doubtful_) add_axis(axes, axis);
+  blind.block<3, 3>(kVelocity, kVelocity) = projector_on(axes);
   return blind;
 }
 

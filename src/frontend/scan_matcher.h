@@ -40,6 +40,8 @@ struct MatchResult {
   /// Mean age of the map points that the scan met. Times map_noise: all its scans share those errors, so that what one
   /// more of them adds is the part without.
   double map_age_scans = 1.0;
+  /// Unit axes (odom) along which the place may be another one that looks alike, see reacquire(). The caller's.
+  std::vector<Eigen::Vector3d> doubtful;
   /// By how much its planes disagree on the pose, order of ErrorBlock; see plane_disagreement. Zero when not applied.
   Matrix6d disagreement = Matrix6d::Zero();
 };
@@ -54,9 +56,11 @@ class ScanMatcher {
   /// `T_start`: where to look for planes first; the predicted pose, unless that is too far off (see reacquire).
   /// `salient_since`: the first scan of the map whose planes may count as salient. Along a blind direction the pose may
   /// have moved against older ones by more than the matcher reaches, and what it meets then is something else.
+  /// `doubtful`: orthonormal axes (odom) along which the place may be a wrong one (see reacquire). The step to it says
+  /// nothing about the velocity there: in a wrong place the error of that would be seen by nobody.
   [[nodiscard]] MatchResult match(const FilterState& predicted, const Pose& T_start,
                                   std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
-                                  int salient_since = 0);
+                                  int salient_since = 0, std::span<const Eigen::Vector3d> doubtful = {});
 
   /// True while surfaces are found to move along a direction that few others face, see MovingSurfaces.
   [[nodiscard]] bool is_restless() const { return moving_surfaces_.is_restless(); }
@@ -135,6 +139,7 @@ class ScanMatcher {
   double mean_map_scan_ = 0.0;    ///< number of the scan that a met map point comes from
   double pooled_variance_ = 0.0;  ///< see is_salient
   int salient_since_ = 0;
+  std::vector<Eigen::Vector3d> doubtful_;  ///< see match()
   bool speed_is_known_ = false;
   MovingSurfaces moving_surfaces_;
   std::vector<MatchedSurface> surfaces_;  ///< the constraints as MovingSurfaces wants them

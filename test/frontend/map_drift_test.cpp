@@ -154,6 +154,14 @@ TEST_F(Drifted, PlanesAreSureSinceThePositionWasAsWellKnownAsNow) {
   EXPECT_EQ(drift.sure_since(now, kStart.translation, 0.05), 211) << "none";
 }
 
+TEST_F(Drifted, WhereThePlaceIsDoubtfulNothingIsLearned) {
+  const Eigen::Matrix3d before = Eigen::Vector3d(0.25, 0.25, 0.36).asDiagonal();
+  const Eigen::Matrix3d in_map = 1e-4 * Eigen::Matrix3d::Identity();
+  drift.doubt(before, along, kStart, in_map);
+  EXPECT_NEAR(variances().z(), 0.36 - 1e-4, 1e-12) << "both make up what was known before";
+  EXPECT_NEAR(variances().x(), 0.0, 1e-12) << "along other axes the scan counts";
+}
+
 TEST_F(Drifted, AScanThatDoesNotEnterTheMapPlacesNothing) {
   drift.remember(210, 9.0 * Eigen::Matrix3d::Identity(), kStart.translation, {});
   drift.hold_to(210.0, along, kStart);

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "common/so3.h"
 #include "frontend/scan_matcher.h"
@@ -32,8 +36,11 @@ TEST(Reacquisition, FindsThePlaceThatTheMatcherAloneMisses) {
     const Eigen::Vector3d shift = 0.25 * Eigen::Vector3d(normal(random), 0.3 * normal(random), normal(random));
     const Pose wrong{so3::exp(0.01 * Eigen::Vector3d(normal(random), normal(random), normal(random))), shift};
     const FilterState predicted = predicted_at(wrong, 0.25, 0.01);
-    const Pose found = reacquire(predicted, standing.newest_two, standing.map, standing.config);
+    const Reacquisition place = reacquire(predicted, standing.newest_two, standing.map, standing.config);
+    const Pose& found = place.T_odom_body;
     EXPECT_LT(found.translation.norm(), 0.05) << "from " << shift.transpose();
+    const bool is_expected = shift.norm() < 3.0 * 0.25;
+    EXPECT_EQ(place.doubtful.empty(), is_expected) << place.doubt;
 
     const auto match = [&](const Pose& start) {
       return ScanMatcher(standing.config).match(predicted, start, standing.newest_two, standing.map);
@@ -50,16 +57,107 @@ TEST(Reacquisition, FindsThePlaceThatTheMatcherAloneMisses) {
 TEST(Reacquisition, LeavesACertainPredictionAlone) {
   const StandingSensor standing;
   const Pose near{Eigen::Quaterniond::Identity(), {0.03, 0.0, 0.02}};
-  const Pose start = reacquire(predicted_at(near, 0.02, 0.001), standing.newest_two, standing.map, standing.config);
-  EXPECT_EQ(start.translation, near.translation);
+  const Reacquisition start =
+      reacquire(predicted_at(near, 0.02, 0.001), standing.newest_two, standing.map, standing.config);
+  EXPECT_EQ(start.T_odom_body.translation, near.translation);
+  EXPECT_TRUE(start.doubtful.empty());
 }
 
 TEST(Reacquisition, StaysWithThePredictionWhereThereIsNoMap) {
   const StandingSensor standing;
   const LocalMap empty(standing.config);
   const Pose pose{Eigen::Quaterniond::Identity(), {1.0, 0.0, 2.0}};
-  const Pose start = reacquire(predicted_at(pose, 1.0, 0.1), standing.newest_two, empty, standing.config);
-  EXPECT_EQ(start.translation, pose.translation);
+  const Reacquisition start = reacquire(predicted_at(pose, 1.0, 0.1), standing.newest_two, empty, standing.config);
+  EXPECT_EQ(start.T_odom_body.translation, pose.translation);
+  EXPECT_EQ(start.doubtful.size(), 3U);
+  EXPECT_EQ(start.doubt, "place: 0 % of the points meet the map");
+}
+
+TEST(Reacquisition, GetsPastAPlaceThatLooksNearlyRight) {
+  const StandingSensor standing;
+  int missed = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    const double angle = trial * 2.0 * std::numbers::pi / 12.0;
+    const Eigen::Vector3d shift(1.4 * std::cos(angle), 0.2, 1.4 * std::sin(angle));
+    const FilterState predicted = predicted_at({Eigen::Quaterniond::Identity(), shift}, 0.65, 0.005);
+    const Reacquisition place = reacquire(predicted, standing.newest_two, standing.map, standing.config);
+    EXPECT_LT(place.T_odom_body.translation.norm(), 0.1) << "from " << shift.transpose();
+    const MatchResult alone =
+        ScanMatcher(standing.config).match(predicted, predicted.nominal.T_odom_body, standing.newest_two, standing.map);
+    missed += alone.stats.applied() ? 1 : 0;
+  }
+  EXPECT_GT(missed, 0) << "the fault that is guarded against: applied, and a metre off";
+}
+
+constexpr double kBay = 1.5;  // m
+
+/// Bays along a hall whose ends are out of sight, mapped by driving through seven of them.
+struct Bays {
+  Bays() {
+    test::World world;
+    world.room = {{-4.0, -0.6, -100.0}, {4.0, 3.0, 100.0}};
+    for (int bay = -20; bay <= 20; ++bay) {
+      const double z = kBay * (bay + 0.5);
+      world.boxes.push_back({{-4.0, -0.6, z - 0.15}, {-2.5, 3.0, z + 0.15}});
+      world.boxes.push_back({{2.5, -0.6, z - 0.15}, {4.0, 3.0, z + 0.15}});
+    }
+    const test::Drive drive = test::simulate(world, test::straight_drive(10.0, 0.0), 2.0, test::Sensors{}, 3);
+    for (std::size_t i = 0; i < 30; ++i) {
+      std::vector<Eigen::Vector3f> points;
+      for (const ScanPoint& point : drive.scans[i].points) points.push_back(point.position);
+      for (int bay = -3; i < 28 && bay <= 3; ++bay) {
+        map.insert(points, {Eigen::Quaterniond::Identity(), {0.0, 0.0, kBay * bay}}, true);
+      }
+      if (i >= 28) newest_two.insert(newest_two.end(), points.begin(), points.end());
+    }
+  }
+
+  [[nodiscard]] Reacquisition reacquired_from(double along, double sigma_m) const {
+    const Pose wrong{Eigen::Quaterniond::Identity(), {0.2, 0.0, along}};
+    return reacquire(predicted_at(wrong, sigma_m, 0.005), newest_two, map, config);
+  }
+
+  FrontendConfig config = test::tuned_config();
+  LocalMap map{config};
+  std::vector<Eigen::Vector3f> newest_two;
+};
+
+TEST(Reacquisition, AmongBaysThatLookAlikeTheWayAlongThemIsDoubtful) {
+  const Bays bays;
+  for (const double along : {-0.75, -0.4, 0.0, 0.4, 0.75}) {
+    const Reacquisition place = bays.reacquired_from(along, 1.0);
+    ASSERT_EQ(place.doubtful.size(), 1U) << along << ": " << place.doubt;
+    EXPECT_GT(std::abs(place.doubtful.front().z()), 0.99) << place.doubt;
+    EXPECT_NE(place.doubt.find("where another fits as well"), std::string::npos) << place.doubt;
+    const double bay = place.T_odom_body.translation.z() / kBay;
+    EXPECT_LT(std::abs(bay - std::round(bay)), 0.1) << "in one of them, all the same";
+    EXPECT_LT(std::abs(place.T_odom_body.translation.x()), 0.1);
+  }
+}
+
+TEST(Reacquisition, APredictionThatIsSureOfItsBayLeavesNoDoubt) {
+  const Reacquisition place = Bays().reacquired_from(0.3, 0.3);
+  EXPECT_LT(place.T_odom_body.translation.norm(), 0.1);
+  EXPECT_TRUE(place.doubtful.empty()) << place.doubt;
+}
+
+TEST(Reacquisition, WhereLittleOfTheMapIsInSightThePlaceIsDoubtful) {
+  const StandingSensor standing;
+  const StandingSensor elsewhere(test::street());
+  const Reacquisition place =
+      reacquire(predicted_at(Pose(), 0.6, 0.005), elsewhere.newest_two, standing.map, standing.config);
+  EXPECT_EQ(place.doubtful.size(), 3U);
+  EXPECT_EQ(place.doubt.find("place: "), 0U) << place.doubt;
+}
+
+TEST(Reacquisition, APlaceThatThePredictionHardlyAllowsIsDoubtful) {
+  const StandingSensor standing;
+  const Pose wrong{Eigen::Quaterniond::Identity(), {0.0, 0.0, 1.75}};
+  const Reacquisition place =
+      reacquire(predicted_at(wrong, 0.5, 0.005), standing.newest_two, standing.map, standing.config);
+  EXPECT_LT(place.T_odom_body.translation.norm(), 0.1);
+  EXPECT_EQ(place.doubtful.size(), 3U);
+  EXPECT_NE(place.doubt.find("sigma from where it was expected"), std::string::npos) << place.doubt;
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/scan_matcher.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -44,6 +45,26 @@ TEST_F(ScanMatcherTest, ACovarianceThatIsNoNumberIsANumericalFailureAndChangesNo
   EXPECT_EQ(result.stats.reason, ScanReason::kNumericalFailure);
   EXPECT_EQ(result.filter.nominal.T_odom_body.translation, predicted_.nominal.T_odom_body.translation);
   EXPECT_TRUE(result.information_body.isZero());
+}
+
+TEST_F(ScanMatcherTest, AStepToADoubtfulPlaceSaysNothingOfTheVelocityThere) {
+  // After some seconds of dead reckoning, position and velocity are off alike.
+  for (int k = 0; k < 3; ++k) {
+    predicted_.covariance(kPosition + k, kPosition + k) = 0.01;
+    predicted_.covariance(kVelocity + k, kVelocity + k) = 0.01;
+    predicted_.covariance(kPosition + k, kVelocity + k) = 0.009;
+    predicted_.covariance(kVelocity + k, kPosition + k) = 0.009;
+  }
+  predicted_.nominal.T_odom_body.translation = {0.03, 0.0, 0.03};
+  const std::array<Eigen::Vector3d, 1> doubtful{Eigen::Vector3d::UnitZ()};
+  const MatchResult result = ScanMatcher(config_).match(predicted_, predicted_.nominal.T_odom_body, standing_.newest,
+                                                        standing_.map, 0, doubtful);
+  ASSERT_TRUE(result.stats.applied());
+  EXPECT_LT(result.filter.nominal.T_odom_body.translation.norm(), 0.01) << "the position is corrected";
+  EXPECT_NEAR(result.filter.nominal.v_odom.z(), 0.0, 1e-9);
+  EXPECT_NEAR(result.filter.covariance(kVelocity + 2, kVelocity + 2), 0.01, 1e-6);
+  EXPECT_LT(result.filter.nominal.v_odom.x(), -0.02) << "the other axis as ever";
+  EXPECT_LT(result.filter.covariance(kVelocity, kVelocity), 0.005);
 }
 
 /// A standing sensor 8 m from the end of a corridor whose axis the scan as a whole is held to say nothing about.

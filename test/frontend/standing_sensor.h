@@ -8,15 +8,16 @@
 
 namespace ignis::test {
 
-/// A second and a half of scans of the furnished hall from a standing sensor at the origin: 29 as a map.
+/// A second and a half of scans of a world, the furnished hall unless told, from a standing sensor at the origin: 29 as
+/// a map.
 struct StandingSensor {
   FrontendConfig config = tuned_config();
   LocalMap map{config};
   std::vector<Eigen::Vector3f> newest;      ///< the next scan
   std::vector<Eigen::Vector3f> newest_two;  ///< and the last one of the map before it
 
-  StandingSensor() {
-    const Drive drive = simulate(furnished_hall(), straight_drive(10.0, 0.0), 2.0, Sensors{}, 3);
+  explicit StandingSensor(const World& world = furnished_hall()) {
+    const Drive drive = simulate(world, straight_drive(10.0, 0.0), 2.0, Sensors{}, 3);
     for (std::size_t i = 0; i < 30; ++i) {
       newest.clear();
       for (const ScanPoint& point : drive.scans[i].points) newest.push_back(point.position);

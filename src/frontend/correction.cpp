@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How a scan corrects the filter: where matching begins, and what the covariances that are published take from it.
+#include <algorithm>
+#include <utility>
+
+#include "frontend/lio.h"
+#include "frontend/scan_instant.h"
+#include "frontend/voxel_downsample.h"
+
+namespace ignis {
+namespace {
+
+/// Beside what the scan does not observe.
+void name_doubt(MatchResult& match, const std::string& doubt) {
+  ScanStats& stats = match.stats;
+  stats.degenerate_directions += static_cast<int>(match.doubtful.size());
+  stats.unobserved += (stats.unobserved.empty() ? "" : "; ") + doubt;
+}
+
+}  // namespace
+
+/// `age` [s] is that of the points in the mean: of the position at that instant the scan tells.
+MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse, double age) {
+  MatchResult result;
+  result.filter = filter_;
+  if (std::ssize(cloud) < config_.min_scan_points) {
+    result.stats.reason = ScanReason::kTooFewPoints;
+  } else if (!config_.use_scan_matching) {
+    result.stats.reason = ScanReason::kMatchingDisabled;
+  } else if (map_.empty()) {
+    result.stats.reason = ScanReason::kMapEmpty;
+  } else {
+    const bool is_large = std::ssize(cloud) > config_.max_scan_points;
+    every_nth(is_large ? sparse : cloud, config_.max_scan_points, match_points_);
+    const Reacquisition place = place_to_begin();
+    const int salient_since = sure_since(config_.match_radius_m);
+    const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
+    result = matcher_.match(seen, place.T_odom_body, match_points_, map_, salient_since, place.doubtful);
+    result.doubtful = place.doubtful;
+    if (!place.doubt.empty()) name_doubt(result, place.doubt);
+    const Eigen::Vector3d gained = result.filter.nominal.v_odom - filter_.nominal.v_odom;
+    result.filter.nominal.T_odom_body.translation += age * gained;
+    result.filter.covariance = with_position_at(result.filter.covariance, age);
+  }
+  return result;
+}
+
+/// Where the matcher looks first. The map may lie farther from the points than it sees: nothing was corrected for a
+/// while, or the velocity of a moving start is not known yet.
+Reacquisition Lio::place_to_begin() const {
+  Reacquisition place{.T_odom_body = filter_.nominal.T_odom_body, .doubtful = {}, .doubt = {}};
+  const double sees = std::max(config_.match_radius_m, config_.wide_match_radius_m);
+  const bool is_far = filter_.covariance.diagonal().segment<3>(kPosition).maxCoeff() > sees * sees;
+  const bool was_silent =
+      !last_correction_ || seconds_between(*last_correction_, filter_.nominal.utime) > kSecondsUntilReacquisition;
+  if (!velocity_known_) {
+    if (is_far || was_silent) place.T_odom_body = approached(filter_, match_points_, map_, config_);
+  } else if (was_silent) {
+    place = reacquire(filter_, match_points_, map_, config_);
+  }
+  // Ten scans confirm a resumption before anything is built on it: they say more than what the first one leaves open.
+  if (trust_.awaits_confirmation()) return {.T_odom_body = place.T_odom_body, .doubtful = {}, .doubt = {}};
+  return place;
+}
+
+/// The first scan of the map since which the position has become less certain by no more than `sigma_m`.
+int Lio::sure_since(double sigma_m) const {
+  return drift_.sure_since(published_position_covariance(), filter_.nominal.T_odom_body.translation, sigma_m);
+}
+
+Eigen::Matrix3d Lio::published_position_covariance() const {
+  const Matrix6d drift = drift_.pose_covariance(filter_.nominal.T_odom_body);
+  return cautious_.block<3, 3>(kPosition, kPosition) + drift.bottomRightCorner<3, 3>();
+}
+
+void Lio::count_correction(const MatchResult& match, double age) {
+  if (!match.stats.applied()) return;
+  ++applied_scans_;
+  last_correction_ = filter_.nominal.utime;
+  const Eigen::Matrix3d before = published_position_covariance();
+  ErrorCovariance seen = with_position_at(cautious_, -age);
+  const UpdateStep update = information_update(seen, ErrorVector::Zero(), match.reliable, match.considered);
+  if (update.ok) seen = update.covariance;
+  const bool salient = match.salient.constraints.count > 0;
+  const UpdateStep along =
+      salient ? information_update(seen, ErrorVector::Zero(), match.salient.constraints) : UpdateStep{};
+  if (along.ok) seen = along.covariance;
+  cautious_ = with_position_at(seen, age);
+  const Pose& T_odom_body = filter_.nominal.T_odom_body;
+  const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
+  drift_.hand_over(blind, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
+  if (salient) drift_.hold_to(match.salient.mean_scan, blind, T_odom_body);
+  drift_.doubt(before, match.doubtful, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
+}
+
+}  // namespace ignis

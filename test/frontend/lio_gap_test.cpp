@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Seconds without scans while the IMU goes on: a plug, a cloud of dust, a lens that is wiped. Behind them the map lies
+// a metre from where the prediction has it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "frontend/lio_runner.h"
+
+namespace ignis {
+namespace {
+
+using test::Drive;
+using test::LioRun;
+
+constexpr double kGapBegin = 12.0;  // s
+constexpr double kGapEnd = 17.0;
+
+Drive with_a_gap(const test::World& world, const test::Trajectory& truth, std::uint32_t seed) {
+  test::Sensors sensors;
+  sensors.range_sigma = 0.02;
+  Drive drive = test::simulate(world, truth, 22.0, sensors, seed);
+  const Utime begin = drive.imu.front().utime;
+  std::erase_if(drive.scans, [&](const Scan& scan) {
+    return scan.utime > begin + to_micros(kGapBegin) && scan.utime < begin + to_micros(kGapEnd);
+  });
+  return drive;
+}
+
+TEST(LioGap, BehindAGapThePlaceIsFoundOrDoubted) {
+  int found = 0;
+  for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+    const Drive drive = with_a_gap(test::furnished_hall(), test::ellipse_drive(2.5, 6.0, 4.0, 1.0), seed);
+    const LioRun run = test::run_lio(test::tuned_config(), drive);
+    EXPECT_LT(test::worst_silent_error(run, drive), 0.15) << "seed " << seed;
+    found += test::end_error(run, drive) < 0.15 ? 1 : 0;
+  }
+  EXPECT_GE(found, 3) << "none without the search";
+}
+
+/// Bays of 1.5 m along a hall whose ends are out of sight.
+test::World bays() {
+  test::World world;
+  world.room = {{-4.0, -0.6, -200.0}, {4.0, 3.0, 200.0}};
+  for (int bay = -100; bay <= 100; ++bay) {
+    const double z = 1.5 * bay + 0.75;
+    world.boxes.push_back({{-4.0, -0.6, z - 0.15}, {-2.5, 3.0, z + 0.15}});
+    world.boxes.push_back({{2.5, -0.6, z - 0.15}, {4.0, 3.0, z + 0.15}});
+  }
+  return world;
+}
+
+TEST(LioGap, AmongBaysThatLookAlikeThePoseIsNotToldToBeBetterThanItIs) {
+  int wrong = 0;
+  for (std::uint32_t seed = 1; seed <= 8; ++seed) {
+    const Drive drive = with_a_gap(bays(), test::straight_drive(2.5, 1.0), seed);
+    const LioRun run = test::run_lio(test::tuned_config(), drive);
+    EXPECT_LT(test::worst_silent_error(run, drive), 0.5) << "seed " << seed;
+    const double error = test::end_error(run, drive);
+    wrong += error > 0.5 ? 1 : 0;
+    const Eigen::Matrix3d covariance = run.scans.back().covariance.block<3, 3>(kPosition, kPosition);
+    EXPECT_LT(error, 4.0 * std::sqrt(covariance.diagonal().maxCoeff())) << "seed " << seed;
+  }
+  EXPECT_GT(wrong, 0) << "else nothing would be tested";
+}
+
+}  // namespace
+}  // namespace ignis
