@@ -26,12 +26,14 @@ constexpr double kIndependent = 50.0;     // planes that a scan amounts to: neig
 constexpr std::size_t kSearchPoints = 200;
 constexpr std::size_t kScorePoints = 600;
 constexpr std::size_t kMostPlaces = 8;
+// From here on: chosen over the same 282 places as kIndependentPoints. In 77 there is doubt, among them all 19 at which
+// a wrong one comes first (docs/front_end_results.md, After a stretch without corrections).
 constexpr double kPlaceNoise = 0.1;      // m, sigma: of a point at the right place, attitude and map included
 constexpr double kNoPlane = 0.7;         // what a point counts for that is near the map, but near no plane
 constexpr double kUnmapped = 0.4;        // and one where the map holds nothing within kUnmappedRadius
 constexpr double kUnmappedRadius = 1.0;  // m
 constexpr double kOtherPlace = 0.3;      // m: farther apart, two hypotheses are two places
-constexpr double kClearlyBetter = 2.0;   // by its log-likelihood
+constexpr double kClearlyBetter = 3.0;   // by its log-likelihood
 constexpr double kMeetsTheMap = 0.6;     // share of the points
 constexpr double kFine = 0.03;           // m, sigma: of a point at the right place, once the pose is right
 constexpr double kFits = 0.6;            // share of the planes' points, by that
@@ -85,15 +87,15 @@ class PlaceFinder {
   }
 
   /// From the prediction on.
-  [[nodiscard]] NavState approached(std::span<const Eigen::Vector3f> points_body) const {
+  [[nodiscard]] NavState approached(const Points& points) const {
     const double sigma = largest_position_sigma(predicted_.covariance);
     const double radius = std::min(kSigmas * sigma, kLargestRadiusVoxels * config_.voxel_size_m);
-    return refined(predicted_.nominal, Points(points_body.begin(), points_body.end()), radius);
+    return refined(predicted_.nominal, points, radius);
   }
 
   /// All that the prediction allows for, best first.
-  [[nodiscard]] std::vector<Hypothesis> hypotheses(std::span<const Eigen::Vector3f> points_body) const {
-    std::vector<Hypothesis> found{judged(approached(points_body))};
+  [[nodiscard]] std::vector<Hypothesis> hypotheses() const {
+    std::vector<Hypothesis> found{judged(approached(search_points_))};
     for (const Eigen::Vector3d& position : likely_places(predicted_, search_points_, map_, kMostPlaces)) {
       NavState state = predicted_.nominal;
       state.T_odom_body.translation = position;
@@ -206,7 +208,9 @@ std::string rivals_in_words(const std::vector<Eigen::Vector3d>& axes) {
 
 Pose approached(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                 const FrontendConfig& config) {
-  return PlaceFinder(predicted, points_body, map, config).approached(points_body).T_odom_body;
+  return PlaceFinder(predicted, points_body, map, config)
+      .approached({points_body.begin(), points_body.end()})
+      .T_odom_body;
 }
 
 Reacquisition reacquire(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
@@ -215,7 +219,7 @@ Reacquisition reacquire(const FilterState& predicted, std::span<const Eigen::Vec
   if (points_body.empty() || kSigmas * largest_position_sigma(predicted.covariance) <= finder.finest()) {
     return {.T_odom_body = predicted.nominal.T_odom_body, .doubtful = {}, .doubt = {}};
   }
-  const std::vector<Hypothesis> hypotheses = finder.hypotheses(points_body);
+  const std::vector<Hypothesis> hypotheses = finder.hypotheses();
   const Hypothesis& best = hypotheses.front();
   Reacquisition found{.T_odom_body = best.state.T_odom_body, .doubtful = {}, .doubt = {}};
   found.doubt = doubt_about(best);
