@@ -2,7 +2,6 @@
 //
 // How a scan corrects the filter: where matching begins, and what the covariances that are published take from it.
 #include <algorithm>
-#include <utility>
 
 #include "frontend/lio.h"
 #include "frontend/scan_instant.h"
@@ -12,9 +11,8 @@ namespace ignis {
 namespace {
 
 /// Beside what the scan does not observe.
-void name_doubt(MatchResult& match, const std::string& doubt) {
-  ScanStats& stats = match.stats;
-  stats.degenerate_directions += static_cast<int>(match.doubtful.size());
+void name_doubt(ScanStats& stats, const std::string& doubt) {
+  if (!stats.applied() || doubt.empty()) return;
   stats.unobserved += (stats.unobserved.empty() ? "" : "; ") + doubt;
 }
 
@@ -38,7 +36,7 @@ MatchResult Lio::correct(const std::vector<CloudPoint>& cloud, const std::vector
     const FilterState seen{filter_.nominal, with_position_at(filter_.covariance, -age)};
     result = matcher_.match(seen, place.T_odom_body, match_points_, map_, salient_since, place.doubtful);
     result.doubtful = place.doubtful;
-    if (!place.doubt.empty()) name_doubt(result, place.doubt);
+    name_doubt(result.stats, place.doubt);
     const Eigen::Vector3d gained = result.filter.nominal.v_odom - filter_.nominal.v_odom;
     result.filter.nominal.T_odom_body.translation += age * gained;
     result.filter.covariance = with_position_at(result.filter.covariance, age);
@@ -74,7 +72,8 @@ Eigen::Matrix3d Lio::published_position_covariance() const {
   return cautious_.block<3, 3>(kPosition, kPosition) + drift.bottomRightCorner<3, 3>();
 }
 
-void Lio::count_correction(const MatchResult& match, double age) {
+void Lio::count_correction(const FilterState& predicted, const MatchResult& match, double age) {
+  if (match.stats.reason == ScanReason::kMapEmpty) last_correction_ = filter_.nominal.utime;  // the map begins here
   if (!match.stats.applied()) return;
   ++applied_scans_;
   last_correction_ = filter_.nominal.utime;
@@ -84,14 +83,18 @@ void Lio::count_correction(const MatchResult& match, double age) {
   if (update.ok) seen = update.covariance;
   const bool salient = match.salient.constraints.count > 0;
   const UpdateStep along =
-      salient ? information_update(seen, ErrorVector::Zero(), match.salient.constraints) : UpdateStep{};
+      salient ? information_update(seen, ErrorVector::Zero(), match.salient.constraints, match.untold_velocity)
+              : UpdateStep{};
   if (along.ok) seen = along.covariance;
   cautious_ = with_position_at(seen, age);
   const Pose& T_odom_body = filter_.nominal.T_odom_body;
   const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
   drift_.hand_over(blind, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
   if (salient) drift_.hold_to(match.salient.mean_scan, blind, T_odom_body);
-  drift_.doubt(before, match.doubtful, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
+  // What was known before was known of the place that was predicted, not of the one that the scan led to.
+  const Eigen::Vector3d shift = T_odom_body.translation - predicted.nominal.T_odom_body.translation;
+  const Eigen::Matrix3d about_here = before + shift * shift.transpose();
+  drift_.doubt(about_here, match.doubtful, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
 }
 
 }  // namespace ignis

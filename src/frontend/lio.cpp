@@ -223,7 +223,7 @@ ScanResult Lio::process(const Scan& scan) {
   match.stats.points = selection.in_range;
   filter_ = match.filter;
   if (learns_nothing()) keep_biases(predicted);
-  count_correction(match, seen_age);
+  count_correction(predicted, match, seen_age);
   if (age * (filter_.nominal.v_odom - predicted.nominal.v_odom).norm() > kDeskewTolerance) {
     cloud = register_points(selection.scan);
     sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);

@@ -108,7 +108,7 @@ class Lio {
   [[nodiscard]] int sure_since(double sigma_m) const;
   /// [m^2] odom axes.
   [[nodiscard]] Eigen::Matrix3d published_position_covariance() const;
-  void count_correction(const MatchResult& match, double age);
+  void count_correction(const FilterState& predicted, const MatchResult& match, double age);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void follow_moving_start(ScanReason reason);

@@ -334,6 +334,19 @@ void LocalMap::drop_empty_regions() {
   rebuild_table(table_.size());
 }
 
+std::vector<Eigen::Vector3d> LocalMap::confirmed_near(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) const {
+  const double edge = kEdge * voxel_size_;
+  std::vector<Eigen::Vector3d> found;
+  for (const Block& block : blocks_) {
+    const Eigen::Vector3d corner = edge * block.coordinate.cast<double>();
+    if ((corner.array() > hi.array()).any() || (corner.array() + edge < lo.array()).any()) continue;
+    for (std::uint64_t left = block.confirmed; left != 0; left &= left - 1) {
+      found.push_back(corner + block.point(std::countr_zero(left)).cast<double>());
+    }
+  }
+  return found;
+}
+
 std::vector<Eigen::Vector3d> LocalMap::points() const {
   std::vector<Eigen::Vector3d> all;
   all.reserve(static_cast<std::size_t>(size_));

@@ -71,6 +71,8 @@ class LocalMap {
   [[nodiscard]] std::int64_t inserted_points() const { return inserted_points_; }
   [[nodiscard]] int size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
+  /// The confirmed points in the blocks that a box [m, odom] meets. Walks over all blocks: for rare use.
+  [[nodiscard]] std::vector<Eigen::Vector3d> confirmed_near(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) const;
   /// All points, confirmed or not, in a fixed order.
   [[nodiscard]] std::vector<Eigen::Vector3d> points() const;
 

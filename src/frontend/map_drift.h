@@ -71,8 +71,7 @@ class MapDrift {
   void hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body);
 
   /// The place that a scan was matched with may be another one along unit `axes` (odom): along them the position is not
-  /// known better than with `position_covariance`, which was published without the scan. In the map it is known with
-  /// `in_map`, both [m^2, odom axes].
+  /// known better than with `position_covariance`. In the map it is known with `in_map`, both [m^2, odom axes].
   void doubt(const Eigen::Matrix3d& position_covariance, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body,
              const Eigen::Matrix3d& in_map);
 

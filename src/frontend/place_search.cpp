@@ -6,16 +6,14 @@
 #include <cstdint>
 #include <functional>
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 namespace ignis {
 namespace {
 
-constexpr double kCell = 0.2;           // m
-constexpr double kSigmas = 4.0;         // of the prediction
-constexpr double kFarthestShift = 4.0;  // m, along an axis
-constexpr double kFarthestPoint = 20.0;
-constexpr double kApart = 0.5;  // m: nearer ones lead to the same place
+constexpr double kCell = 0.2;    // m
+constexpr double kSigmas = 4.0;  // of the prediction
+constexpr double kApart = 0.5;   // m: nearer ones lead to the same place
 
 using Cell = Eigen::Vector3i;
 
@@ -28,7 +26,7 @@ class Occupancy {
   Occupancy(const LocalMap& map, const Eigen::Vector3d& lo, const Eigen::Vector3d& hi)
       : lo_(lo), size_(((hi - lo) / kCell).array().ceil().cast<int>() + 1) {
     cells_.resize(static_cast<std::size_t>(index_of({0, 0, size_.z()})));
-    for (const Eigen::Vector3d& point : map.points()) {
+    for (const Eigen::Vector3d& point : map.confirmed_near(lo, hi)) {
       const Cell cell = cell_of(point);
       if ((cell.array() < 1).any() || (cell.array() >= size_.array() - 1).any()) continue;
       for (int axis = 0; axis < 3; ++axis) {
@@ -81,14 +79,14 @@ std::vector<Eigen::Vector3d> likely_places(const FilterState& predicted, std::sp
   const Pose& pose = predicted.nominal.T_odom_body;
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   const Eigen::Matrix3d P = predicted.covariance.block<3, 3>(kPosition, kPosition);
-  const Eigen::Array3d farthest = (kSigmas * P.diagonal().cwiseSqrt()).cwiseMin(kFarthestShift);
+  const Eigen::Array3d farthest = (kSigmas * P.diagonal().cwiseSqrt()).cwiseMin(kFarthestPlace);
   const Cell reach = (farthest / kCell).ceil().cast<int>();
 
   std::vector<Eigen::Vector3d> points;
   Eigen::Vector3d lo = pose.translation;
   Eigen::Vector3d hi = pose.translation;
   for (const Eigen::Vector3f& point : points_body) {
-    if (point.norm() > kFarthestPoint) continue;
+    if (point.norm() > kFarthestSearchPoint) continue;
     points.emplace_back(R * point.cast<double>() + pose.translation);
     lo = lo.cwiseMin(points.back());
     hi = hi.cwiseMax(points.back());
@@ -99,7 +97,8 @@ std::vector<Eigen::Vector3d> likely_places(const FilterState& predicted, std::sp
   std::vector<std::ptrdiff_t> indices;
   for (const Eigen::Vector3d& point : points) indices.push_back(occupancy.index_of(occupancy.cell_of(point)));
 
-  const Eigen::Matrix3d information = P.inverse();
+  // What lies half a cell beside the line of a thin prediction is meant by it, too.
+  const Eigen::Matrix3d information = (P + kCell * kCell / 12.0 * Eigen::Matrix3d::Identity()).inverse();
   const double weight = kIndependentPoints / (Occupancy::kFull * static_cast<double>(points.size()));
   std::vector<Place> places;
   for (int z = -reach.z(); z <= reach.z(); ++z) {
@@ -107,7 +106,7 @@ std::vector<Eigen::Vector3d> likely_places(const FilterState& predicted, std::sp
       for (int x = -reach.x(); x <= reach.x(); ++x) {
         const Eigen::Vector3d shift = kCell * Eigen::Vector3d(x, y, z);
         const double sigmas2 = shift.dot(information * shift);
-        if (sigmas2 > kSigmas * kSigmas) continue;
+        if (!(sigmas2 <= kSigmas * kSigmas)) continue;
         const std::ptrdiff_t offset = occupancy.index_of({x, y, z});
         int filled = 0;
         for (const std::ptrdiff_t index : indices) filled += occupancy.filled(index + offset);

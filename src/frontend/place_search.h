@@ -13,14 +13,17 @@ namespace ignis {
 /// Where a prediction that may be off by metres can have been meant: the shifts under which most points come to lie in
 /// occupied cells of the map, at the predicted attitude, each weighed by how likely the prediction calls it.
 ///
-/// Every cell within four sigma is tried, so that no local optimum can hide another one. After: E. Olson, "Real-time
-/// correlative scan matching", ICRA 2009, in three dimensions.
+/// Every cell within four sigma and kFarthestPlace is tried, so that no local optimum can hide another one. After: E.
+/// Olson, "Real-time correlative scan matching", ICRA 2009, in three dimensions.
 ///
 /// At most `most` positions [m, odom], best first and apart from each other by more than kApart, a cell (0.2 m) within
-/// the best near each. Points that are farther than 20 m have no say.
+/// the best near each. Points that are farther than kFarthestSearchPoint have no say. The covariance has to be finite.
 [[nodiscard]] std::vector<Eigen::Vector3d> likely_places(const FilterState& predicted,
                                                          std::span<const Eigen::Vector3f> points_body,
                                                          const LocalMap& map, std::size_t most);
+
+inline constexpr double kFarthestPlace = 4.0;         ///< m, along an axis, from the prediction
+inline constexpr double kFarthestSearchPoint = 20.0;  ///< m: beyond, a bit of attitude moves a point by a cell
 
 /// Independent points that a scan amounts to: what the share of its points that fit is worth as a log-likelihood of a
 /// place. Of 282 places after five seconds without scans in four scenes, 12 put 43 wrong ones first, 25 put 23, 40

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <format>
 #include <functional>
+#include <iterator>
 #include <optional>
 
 #include "frontend/place_search.h"
@@ -17,7 +18,7 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3f>;
 
-constexpr double kSigmas = 4.0;
+constexpr double kSigmas = 4.0;                // of the prediction: how far a place may be
 constexpr double kLargestRadiusVoxels = 20.0;  // beyond, planes of another place are as near
 constexpr double kShrink = 0.8;                // of the radius, per pass
 constexpr int kMostPasses = 30;
@@ -39,11 +40,14 @@ constexpr double kFine = 0.03;           // m, sigma: of a point at the right pl
 constexpr double kFits = 0.6;            // share of the planes' points, by that
 constexpr double kExpected = 3.0;        // sigmas of the prediction
 
-/// Evenly spread over all.
+/// Of those that are not too far, evenly spread.
 Points some_of(std::span<const Eigen::Vector3f> points, std::size_t most) {
+  Points near;
+  const auto is_near = [](const Eigen::Vector3f& point) { return point.norm() <= kFarthestSearchPoint; };
+  std::ranges::copy_if(points, std::back_inserter(near), is_near);
   Points some;
-  const std::size_t step = std::max<std::size_t>((points.size() + most - 1) / most, 1);
-  for (std::size_t i = 0; i < points.size(); i += step) some.push_back(points[i]);
+  const std::size_t step = std::max<std::size_t>((near.size() + most - 1) / most, 1);
+  for (std::size_t i = 0; i < near.size(); i += step) some.push_back(near[i]);
   return some;
 }
 
@@ -142,7 +146,7 @@ class PlaceFinder {
       const Eigen::Vector3d query = R * point.cast<double>() + pose.translation;
       const std::optional<Eigen::Vector3d> nearest = map_.nearest(query, finest());
       if (!nearest) {
-        support += map_.nearest(query, kUnmappedRadius) ? 0.0 : kUnmapped;
+        support += map_.nearest(query, std::max(kUnmappedRadius, 2.0 * finest())) ? 0.0 : kUnmapped;
         continue;
       }
       ++near;
@@ -156,7 +160,7 @@ class PlaceFinder {
       support += bell(distance / kPlaceNoise);
       fine_support += bell(distance / kFine);
     }
-    const double share = 1.0 / static_cast<double>(score_points_.size());
+    const double share = 1.0 / std::max(static_cast<double>(score_points_.size()), 1.0);
     const Eigen::Vector3d shift = pose.translation - predicted_.nominal.T_odom_body.translation;
     const Eigen::Matrix3d P = predicted_.covariance.block<3, 3>(kPosition, kPosition);
     const double sigmas2 = shift.dot(P.inverse() * shift);
@@ -181,7 +185,8 @@ std::vector<Eigen::Vector3d> ways_to_rivals(const std::vector<Hypothesis>& hypot
   for (const Hypothesis& other : hypotheses) {
     const Eigen::Vector3d way = other.state.T_odom_body.translation - best.state.T_odom_body.translation;
     if (way.norm() <= kOtherPlace || best.log_likelihood - other.log_likelihood > kClearlyBetter) continue;
-    add_axis(axes, way.normalized());
+    const Eigen::Vector3d across = way - projector_on(axes) * way;
+    if (across.norm() > kOtherPlace) axes.push_back(across.normalized());
   }
   return axes;
 }
@@ -216,13 +221,15 @@ Pose approached(const FilterState& predicted, std::span<const Eigen::Vector3f> p
 Reacquisition reacquire(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                         const FrontendConfig& config) {
   const PlaceFinder finder(predicted, points_body, map, config);
-  if (points_body.empty() || kSigmas * largest_position_sigma(predicted.covariance) <= finder.finest()) {
+  const double reach = kSigmas * largest_position_sigma(predicted.covariance);
+  if (points_body.empty() || !predicted.covariance.allFinite() || reach <= finder.finest()) {
     return {.T_odom_body = predicted.nominal.T_odom_body, .doubtful = {}, .doubt = {}};
   }
   const std::vector<Hypothesis> hypotheses = finder.hypotheses();
   const Hypothesis& best = hypotheses.front();
   Reacquisition found{.T_odom_body = best.state.T_odom_body, .doubtful = {}, .doubt = {}};
-  found.doubt = doubt_about(best);
+  found.doubt = reach > kFarthestPlace ? std::format("place: searched within {:.0f} of {:.1f} m", kFarthestPlace, reach)
+                                       : doubt_about(best);
   if (!found.doubt.empty()) {
     found.doubtful = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()};
     return found;

@@ -35,9 +35,11 @@ struct Reacquisition {
 /// In an established map, after a stretch without corrections: what approached() leads to is one place of several, and
 /// likely_places() finds the others. The one is taken that the points support most and the prediction does not speak
 /// against. Aisles and doors repeat themselves: others that are nearly as good make the axis that leads to them
-/// doubtful. All axes are where few points meet the map, or do not lie in its planes, or the place was not expected.
+/// doubtful. All axes are where few points meet the map, or do not lie in its planes, or the place was not expected, or
+/// may be farther than the search reaches.
 ///
-/// Returns the predicted pose, without doubt, where four sigma lie within the matcher's radius.
+/// Returns the predicted pose, without doubt, where four sigma lie within the matcher's radius, and where the
+/// prediction's covariance is no number.
 [[nodiscard]] Reacquisition reacquire(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body,
                                       const LocalMap& map, const FrontendConfig& config);
 

@@ -7,7 +7,7 @@ namespace ignis {
 namespace {
 
 constexpr double kRegained = 1e-3;  // squared sine of an angle of two degrees between what was and what is not observed
-constexpr double kMostlyAcross = 0.7;  // sine of the angle between an axis and those that there are
+constexpr double kMostlyAcross = 0.5;  // sine of the angle between an axis and those that there are
 
 }  // namespace
 

@@ -39,7 +39,7 @@ class RegainedView {
   }
 };
 
-/// Adds the part of a unit axis that is across to orthonormal `axes`, unless it is the smaller one.
+/// Adds the part of a unit axis that is across to orthonormal `axes`, unless it is within 30 degrees of them.
 void add_axis(std::vector<Eigen::Vector3d>& axes, Eigen::Vector3d axis);
 
 /// Onto the space that orthonormal `axes` span.

@@ -36,8 +36,8 @@ constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level 
 constexpr auto kAll = [](const auto&) { return true; };
 
 /// A step of its own from where the iterate is; false on numerical failure.
-bool take_step(FilterState& iterate, const PoseInformation& constraints) {
-  const UpdateStep update = information_update(iterate.covariance, ErrorVector::Zero(), constraints);
+bool take_step(FilterState& iterate, const PoseInformation& constraints, const ErrorCovariance& considered) {
+  const UpdateStep update = information_update(iterate.covariance, ErrorVector::Zero(), constraints, considered);
   if (!update.ok) return false;
   iterate.nominal = perturbed(iterate.nominal, update.step);
   iterate.covariance = update.covariance;
@@ -61,7 +61,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
                                std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since,
                                std::span<const Eigen::Vector3d> doubtful) {
   salient_since_ = salient_since;
-  doubtful_.assign(doubtful.begin(), doubtful.end());
+  untold_velocity_.block<3, 3>(kVelocity, kVelocity) = projector_on(doubtful);
   speed_is_known_ = largest_sigma(predicted.covariance, kVelocity) < kKnownSpeed;
   expect(predicted);
   MatchResult result;
@@ -268,13 +268,13 @@ PoseInformation ScanMatcher::accumulate(const Pose& pose, const Matrix6d& pose_c
 }
 
 ErrorCovariance ScanMatcher::considered() const {
-  ErrorCovariance blind = ErrorCovariance::Zero();
+  ErrorCovariance blind = untold_velocity_;
+  if (!config_.project_degenerate) return blind;
   blind.topLeftCorner<6, 6>() = degeneracy_.blind_part;
-  blind.block<3, 3>(kVelocity, kVelocity) = degeneracy_.blind_part.bottomRightCorner<3, 3>();
-  if (doubtful_.empty()) return blind;
-  std::vector<Eigen::Vector3d> axes = blind_shifts(degeneracy_);
-  for (const Eigen::Vector3d& axis : doubtful_) add_axis(axes, axis);
-  blind.block<3, 3>(kVelocity, kVelocity) = projector_on(axes);
+  const Eigen::Matrix3d shifts = degeneracy_.blind_part.bottomRightCorner<3, 3>();
+  const Eigen::Matrix3d others = Eigen::Matrix3d::Identity() - shifts;
+  const Eigen::Matrix3d untold = others * untold_velocity_.block<3, 3>(kVelocity, kVelocity) * others;
+  blind.block<3, 3>(kVelocity, kVelocity) = shifts + untold;
   return blind;
 }
 
@@ -283,7 +283,8 @@ bool ScanMatcher::iterate(const FilterState& predicted, std::span<const Eigen::V
   FilterState& iterate = result.filter;
   Pose associated_at = iterate.nominal.T_odom_body;
   ErrorCovariance gate_covariance = predicted.covariance;
-  if (config_.project_degenerate) result.considered = considered();
+  result.considered = considered();
+  result.untold_velocity = untold_velocity_;
   for (int pass = 0; pass < config_.iterations; ++pass) {
     const Vector6d moved = body_difference(associated_at, iterate.nominal.T_odom_body);
     if (moved.tail<3>().norm() + mean_range_ * moved.head<3>().norm() > 0.5 * config_.voxel_size_m) {
@@ -358,12 +359,12 @@ SalientPart ScanMatcher::find_salient(const FilterState& at) {
 std::optional<Matrix6d> ScanMatcher::step_along_degenerate(FilterState& iterate, SalientPart& salient) {
   if (config_.salient_sigma > 0.0) {
     salient = find_salient(iterate);
-    if (!take_step(iterate, salient.constraints)) return std::nullopt;
+    if (!take_step(iterate, salient.constraints, untold_velocity_)) return std::nullopt;
   }
   const PoseInformation doubtful =
       accumulate(iterate.nominal.T_odom_body, iterate.covariance.topLeftCorner<6, 6>(), kAll)
           .projected(degeneracy_.doubtful);
-  if (!take_step(iterate, doubtful)) return std::nullopt;
+  if (!take_step(iterate, doubtful, untold_velocity_)) return std::nullopt;
   return salient.constraints.information + doubtful.information;
 }
 

@@ -34,6 +34,8 @@ struct MatchResult {
   SalientPart salient;
   /// Projects on what `reliable` must not correct: position along directions that it leaves open, and velocity with it.
   ErrorCovariance considered = ErrorCovariance::Zero();
+  /// The part of that which `salient` must not correct either: velocity along doubtful axes.
+  ErrorCovariance untold_velocity = ErrorCovariance::Zero();
   DegeneracyAnalysis degeneracy;                     ///< which directions that leaves open
   Eigen::Matrix3d facing = Eigen::Matrix3d::Zero();  ///< mean of n n^T over the planes, odom axes
   double map_noise = 1.0;  ///< factor by which the errors of a young map widened the variance of what was matched
@@ -139,7 +141,8 @@ class ScanMatcher {
   double mean_map_scan_ = 0.0;    ///< number of the scan that a met map point comes from
   double pooled_variance_ = 0.0;  ///< see is_salient
   int salient_since_ = 0;
-  std::vector<Eigen::Vector3d> doubtful_;  ///< see match()
+  /// Projects on what a doubtful place says nothing of, see match().
+  ErrorCovariance untold_velocity_ = ErrorCovariance::Zero();
   bool speed_is_known_ = false;
   MovingSurfaces moving_surfaces_;
   std::vector<MatchedSurface> surfaces_;  ///< the constraints as MovingSurfaces wants them

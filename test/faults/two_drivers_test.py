@@ -125,7 +125,7 @@ def test_fault_b7_a_second_driver_on_another_computer_is_named_by_every_process_
     assert "l1_driver" not in again.of("lio_frontend")[1]
     rates = [heard.rates("lio_frontend", "L1_IMU") for heard in (alone, both, again)]
     assert [usual for usual, _ in rates] == pytest.approx([250.0] * 3, rel=0.04), "of the first driver, and of it alone"
-    assert [mean for _, mean in rates] == pytest.approx([250.0] * 3, rel=0.2), "nor for a second or two of the other"
+    assert [mean for _, mean in rates] == pytest.approx([250.0] * 3, rel=0.2), "nor for two seconds of the other"
     assert first.returncode is None or first.returncode == 0
 
 

@@ -52,6 +52,26 @@ TEST(PlaceSearch, FindsNothingWithoutPointsAndOnlyThePredictionWithoutAMap) {
   EXPECT_EQ(places.front(), position);
 }
 
+TEST(PlaceSearch, ASurePredictionAlongADiagonalLeavesPlacesAlongIt) {
+  const test::StandingSensor standing;
+  const Eigen::Vector3d along = Eigen::Vector3d(1.0, 0.0, 1.0).normalized();
+  FilterState predicted = predicted_at(0.8 * along, 0.01);
+  predicted.covariance.block<3, 3>(kPosition, kPosition) += along * along.transpose();
+  const auto places = likely_places(predicted, standing.newest_two, standing.map, 8);
+  ASSERT_GT(places.size(), 1U);
+  EXPECT_LT(places.front().norm(), 0.3);
+}
+
+TEST(PlaceSearch, WhatWasRefusedHasNoVote) {
+  const test::StandingSensor standing;
+  LocalMap map = standing.map;
+  const Eigen::Vector3d wrong(1.3, 0.2, -0.9);
+  for (int i = 0; i < 5; ++i) map.insert(standing.newest_two, {Eigen::Quaterniond::Identity(), wrong}, false);
+  const auto places = likely_places(predicted_at(wrong, 0.8), standing.newest_two, map, 8);
+  ASSERT_FALSE(places.empty());
+  EXPECT_LT(places.front().cwiseAbs().maxCoeff(), 0.2);
+}
+
 TEST(PlaceSearch, PointsOutOfReachHaveNoSay) {
   const test::StandingSensor standing;
   std::vector<Eigen::Vector3f> points = standing.newest_two;
