@@ -4,7 +4,10 @@
 // a metre from where the prediction has it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <string>
 
 #include "frontend/lio_runner.h"
 
@@ -49,6 +52,41 @@ test::World bays() {
     world.boxes.push_back({{2.5, -0.6, z - 0.15}, {4.0, 3.0, z + 0.15}});
   }
   return world;
+}
+
+const ScanResult& first_behind_the_gap(const LioRun& run, const Drive& drive) {
+  return *std::ranges::find_if(run.scans, [&](const ScanResult& scan) {
+    return scan.stats.applied() && test::drive_seconds(drive, scan.state.utime) > kGapEnd;
+  });
+}
+
+TEST(LioGap, WhatWasKnownBeforeWasKnownOfThePredictedPlace) {
+  int doubtful = 0;
+  for (std::uint32_t seed = 1; seed <= 8; ++seed) {
+    const Drive drive = with_a_gap(bays(), test::straight_drive(2.5, 1.0), seed);
+    const LioRun run = test::run_lio(test::tuned_config(), drive);
+    const ScanResult& first = first_behind_the_gap(run, drive);
+    if (first.stats.unobserved.empty()) continue;
+    ++doubtful;
+    const double before = 0.55;  // m, sigma of five seconds without scans
+    const auto after = std::ranges::upper_bound(run.states, first.state.utime, {}, &NavState::utime);
+    const double predicted = std::prev(after)->T_odom_body.translation.z();
+    const double step = 0.9 * (first.state.T_odom_body.translation.z() - predicted);
+    EXPECT_GT(first.covariance(kPosition + 2, kPosition + 2), before * before + step * step) << "seed " << seed;
+  }
+  EXPECT_GT(doubtful, 2);
+}
+
+TEST(LioGap, ScansThatBeginSecondsAfterTheStartAreBehindNoGap) {
+  test::Sensors sensors;
+  Drive drive = test::simulate(test::furnished_hall(), test::ellipse_drive(4.5, 6.0, 4.0, 1.0), 10.0, sensors, 1);
+  const Utime begin = drive.imu.front().utime;
+  std::erase_if(drive.scans, [&](const Scan& scan) { return scan.utime < begin + to_micros(3.4); });
+  const LioRun run = test::run_lio(test::tuned_config(), drive);
+  EXPECT_EQ(run.scans.back().trust, Trust::kOk) << run.status.reason;
+  for (const ScanResult& scan : run.scans) {
+    EXPECT_EQ(scan.stats.unobserved.find("place"), std::string::npos) << scan.stats.unobserved;
+  }
 }
 
 TEST(LioGap, AmongBaysThatLookAlikeThePoseIsNotToldToBeBetterThanItIs) {
