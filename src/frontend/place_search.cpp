@@ -11,9 +11,8 @@
 namespace ignis {
 namespace {
 
-constexpr double kCell = 0.2;    // m
-constexpr double kSigmas = 4.0;  // of the prediction
-constexpr double kApart = 0.5;   // m: nearer ones lead to the same place
+constexpr double kCell = 0.2;   // m
+constexpr double kApart = 0.5;  // m: nearer ones lead to the same place
 
 using Cell = Eigen::Vector3i;
 
@@ -79,7 +78,7 @@ std::vector<Eigen::Vector3d> likely_places(const FilterState& predicted, std::sp
   const Pose& pose = predicted.nominal.T_odom_body;
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   const Eigen::Matrix3d P = predicted.covariance.block<3, 3>(kPosition, kPosition);
-  const Eigen::Array3d farthest = (kSigmas * P.diagonal().cwiseSqrt()).cwiseMin(kFarthestPlace);
+  const Eigen::Array3d farthest = (kPlaceSigmas * P.diagonal().cwiseSqrt()).cwiseMin(kFarthestPlace);
   const Cell reach = (farthest / kCell).ceil().cast<int>();
 
   std::vector<Eigen::Vector3d> points;
@@ -106,7 +105,7 @@ std::vector<Eigen::Vector3d> likely_places(const FilterState& predicted, std::sp
       for (int x = -reach.x(); x <= reach.x(); ++x) {
         const Eigen::Vector3d shift = kCell * Eigen::Vector3d(x, y, z);
         const double sigmas2 = shift.dot(information * shift);
-        if (!(sigmas2 <= kSigmas * kSigmas)) continue;
+        if (!(sigmas2 <= kPlaceSigmas * kPlaceSigmas)) continue;
         const std::ptrdiff_t offset = occupancy.index_of({x, y, z});
         int filled = 0;
         for (const std::ptrdiff_t index : indices) filled += occupancy.filled(index + offset);

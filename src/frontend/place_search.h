@@ -13,7 +13,7 @@ namespace ignis {
 /// Where a prediction that may be off by metres can have been meant: the shifts under which most points come to lie in
 /// occupied cells of the map, at the predicted attitude, each weighed by how likely the prediction calls it.
 ///
-/// Every cell within four sigma and kFarthestPlace is tried, so that no local optimum can hide another one. After: E.
+/// Every cell within kPlaceSigmas and kFarthestPlace is tried, so that no local optimum can hide another one. After: E.
 /// Olson, "Real-time correlative scan matching", ICRA 2009, in three dimensions.
 ///
 /// At most `most` positions [m, odom], best first and apart from each other by more than kApart, a cell (0.2 m) within
@@ -22,6 +22,7 @@ namespace ignis {
                                                          std::span<const Eigen::Vector3f> points_body,
                                                          const LocalMap& map, std::size_t most);
 
+inline constexpr double kPlaceSigmas = 4.0;           ///< of the prediction: how far a place may be
 inline constexpr double kFarthestPlace = 4.0;         ///< m, along an axis, from the prediction
 inline constexpr double kFarthestSearchPoint = 20.0;  ///< m: beyond, a bit of attitude moves a point by a cell
 

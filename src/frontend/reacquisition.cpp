@@ -10,6 +10,7 @@
 
 #include "frontend/place_search.h"
 #include "frontend/plane_fit.h"
+#include "frontend/plane_jacobian.h"
 #include "frontend/regained_view.h"
 #include "frontend/scan_update.h"
 
@@ -18,7 +19,6 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3f>;
 
-constexpr double kSigmas = 4.0;                // of the prediction: how far a place may be
 constexpr double kLargestRadiusVoxels = 20.0;  // beyond, planes of another place are as near
 constexpr double kShrink = 0.8;                // of the radius, per pass
 constexpr int kMostPasses = 30;
@@ -65,11 +65,11 @@ struct Hypothesis {
   double fits = 0.0;      ///< of the points at planes, the share that lies in them
 };
 
-/// Finds places for one scan and says how good they are.
-class PlaceFinder {
+/// Leads one scan to places and says how good they are.
+class PlaceJudge {
  public:
-  PlaceFinder(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
-              const FrontendConfig& config)
+  PlaceJudge(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
+             const FrontendConfig& config)
       : predicted_(predicted),
         search_points_(some_of(points_body, kSearchPoints)),
         score_points_(some_of(points_body, kScorePoints)),
@@ -93,7 +93,7 @@ class PlaceFinder {
   /// From the prediction on.
   [[nodiscard]] NavState approached(const Points& points) const {
     const double sigma = largest_position_sigma(predicted_.covariance);
-    const double radius = std::min(kSigmas * sigma, kLargestRadiusVoxels * config_.voxel_size_m);
+    const double radius = std::min(kPlaceSigmas * sigma, kLargestRadiusVoxels * config_.voxel_size_m);
     return refined(predicted_.nominal, points, radius);
   }
 
@@ -128,8 +128,7 @@ class PlaceFinder {
       if (!nearest) continue;
       const PlaneFit plane = plane_at(*nearest);
       if (plane.verdict != PlaneVerdict::kPlane) continue;
-      Vector6d h;
-      h << point_body.cross(R.transpose() * plane.normal), plane.normal;
+      const Vector6d h = plane_jacobian(R, point_body, plane.normal);
       sum.add(h, plane.normal.dot(query - *nearest - plane.offset), variance);
     }
     return sum;
@@ -213,19 +212,19 @@ std::string rivals_in_words(const std::vector<Eigen::Vector3d>& axes) {
 
 Pose approached(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                 const FrontendConfig& config) {
-  return PlaceFinder(predicted, points_body, map, config)
+  return PlaceJudge(predicted, points_body, map, config)
       .approached({points_body.begin(), points_body.end()})
       .T_odom_body;
 }
 
 Reacquisition reacquire(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                         const FrontendConfig& config) {
-  const PlaceFinder finder(predicted, points_body, map, config);
-  const double reach = kSigmas * largest_position_sigma(predicted.covariance);
-  if (points_body.empty() || !predicted.covariance.allFinite() || reach <= finder.finest()) {
+  const PlaceJudge judge(predicted, points_body, map, config);
+  const double reach = kPlaceSigmas * largest_position_sigma(predicted.covariance);
+  if (points_body.empty() || !predicted.covariance.allFinite() || reach <= judge.finest()) {
     return {.T_odom_body = predicted.nominal.T_odom_body, .doubtful = {}, .doubt = {}};
   }
-  const std::vector<Hypothesis> hypotheses = finder.hypotheses();
+  const std::vector<Hypothesis> hypotheses = judge.hypotheses();
   const Hypothesis& best = hypotheses.front();
   Reacquisition found{.T_odom_body = best.state.T_odom_body, .doubtful = {}, .doubt = {}};
   found.doubt = reach > kFarthestPlace ? std::format("place: searched within {:.0f} of {:.1f} m", kFarthestPlace, reach)

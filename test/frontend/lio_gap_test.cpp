@@ -42,18 +42,6 @@ TEST(LioGap, BehindAGapThePlaceIsFoundOrDoubted) {
   EXPECT_GE(found, 3) << "none without the search";
 }
 
-/// Bays of 1.5 m along a hall whose ends are out of sight.
-test::World bays() {
-  test::World world;
-  world.room = {{-4.0, -0.6, -200.0}, {4.0, 3.0, 200.0}};
-  for (int bay = -100; bay <= 100; ++bay) {
-    const double z = 1.5 * bay + 0.75;
-    world.boxes.push_back({{-4.0, -0.6, z - 0.15}, {-2.5, 3.0, z + 0.15}});
-    world.boxes.push_back({{2.5, -0.6, z - 0.15}, {4.0, 3.0, z + 0.15}});
-  }
-  return world;
-}
-
 const ScanResult& first_behind_the_gap(const LioRun& run, const Drive& drive) {
   return *std::ranges::find_if(run.scans, [&](const ScanResult& scan) {
     return scan.stats.applied() && test::drive_seconds(drive, scan.state.utime) > kGapEnd;
@@ -63,7 +51,7 @@ const ScanResult& first_behind_the_gap(const LioRun& run, const Drive& drive) {
 TEST(LioGap, WhatWasKnownBeforeWasKnownOfThePredictedPlace) {
   int doubtful = 0;
   for (std::uint32_t seed = 1; seed <= 8; ++seed) {
-    const Drive drive = with_a_gap(bays(), test::straight_drive(2.5, 1.0), seed);
+    const Drive drive = with_a_gap(test::bays(), test::straight_drive(2.5, 1.0), seed);
     const LioRun run = test::run_lio(test::tuned_config(), drive);
     const ScanResult& first = first_behind_the_gap(run, drive);
     if (first.stats.unobserved.empty()) continue;
@@ -92,7 +80,7 @@ TEST(LioGap, ScansThatBeginSecondsAfterTheStartAreBehindNoGap) {
 TEST(LioGap, AmongBaysThatLookAlikeThePoseIsNotToldToBeBetterThanItIs) {
   int wrong = 0;
   for (std::uint32_t seed = 1; seed <= 8; ++seed) {
-    const Drive drive = with_a_gap(bays(), test::straight_drive(2.5, 1.0), seed);
+    const Drive drive = with_a_gap(test::bays(), test::straight_drive(2.5, 1.0), seed);
     const LioRun run = test::run_lio(test::tuned_config(), drive);
     EXPECT_LT(test::worst_silent_error(run, drive), 0.5) << "seed " << seed;
     const double error = test::end_error(run, drive);

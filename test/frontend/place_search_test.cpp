@@ -12,11 +12,7 @@ namespace ignis {
 namespace {
 
 FilterState predicted_at(const Eigen::Vector3d& position, double sigma_m) {
-  FilterState filter;
-  filter.nominal.T_odom_body.translation = position;
-  filter.covariance.setIdentity();
-  filter.covariance.diagonal().segment<3>(kPosition).setConstant(sigma_m * sigma_m);
-  return filter;
+  return test::predicted_at({Eigen::Quaterniond::Identity(), position}, sigma_m, 1.0);
 }
 
 TEST(PlaceSearch, PutsTheTruePlaceFirstWithinACell) {

@@ -17,16 +17,8 @@
 namespace ignis {
 namespace {
 
+using test::predicted_at;
 using test::StandingSensor;
-
-FilterState predicted_at(const Pose& pose, double position_sigma, double attitude_sigma) {
-  FilterState filter;
-  filter.nominal.T_odom_body = pose;
-  filter.covariance.setIdentity();
-  filter.covariance.diagonal().segment<3>(kAttitude).setConstant(attitude_sigma * attitude_sigma);
-  filter.covariance.diagonal().segment<3>(kPosition).setConstant(position_sigma * position_sigma);
-  return filter;
-}
 
 TEST(Reacquisition, FindsThePlaceThatTheMatcherAloneMisses) {
   const StandingSensor standing;
@@ -89,24 +81,15 @@ TEST(Reacquisition, GetsPastAPlaceThatLooksNearlyRight) {
   EXPECT_GT(misled, 0) << "by the planes that are nearest to the prediction";
 }
 
-constexpr double kBay = 1.5;  // m
-
-/// Bays along a hall whose ends are out of sight, mapped by driving through seven of them.
+/// Bays of which seven are mapped, each from its middle.
 struct Bays {
   Bays() {
-    test::World world;
-    world.room = {{-4.0, -0.6, -100.0}, {4.0, 3.0, 100.0}};
-    for (int bay = -20; bay <= 20; ++bay) {
-      const double z = kBay * (bay + 0.5);
-      world.boxes.push_back({{-4.0, -0.6, z - 0.15}, {-2.5, 3.0, z + 0.15}});
-      world.boxes.push_back({{2.5, -0.6, z - 0.15}, {4.0, 3.0, z + 0.15}});
-    }
-    const test::Drive drive = test::simulate(world, test::straight_drive(10.0, 0.0), 2.0, test::Sensors{}, 3);
+    const test::Drive drive = test::simulate(test::bays(), test::straight_drive(10.0, 0.0), 2.0, test::Sensors{}, 3);
     for (std::size_t i = 0; i < 30; ++i) {
       std::vector<Eigen::Vector3f> points;
       for (const ScanPoint& point : drive.scans[i].points) points.push_back(point.position);
       for (int bay = -3; i < 28 && bay <= 3; ++bay) {
-        map.insert(points, {Eigen::Quaterniond::Identity(), {0.0, 0.0, kBay * bay}}, true);
+        map.insert(points, {Eigen::Quaterniond::Identity(), {0.0, 0.0, test::kBay * bay}}, true);
       }
       if (i >= 28) newest_two.insert(newest_two.end(), points.begin(), points.end());
     }
@@ -129,7 +112,7 @@ TEST(Reacquisition, AmongBaysThatLookAlikeTheWayAlongThemIsDoubtful) {
     ASSERT_EQ(place.doubtful.size(), 1U) << along << ": " << place.doubt;
     EXPECT_GT(std::abs(place.doubtful.front().z()), 0.99) << place.doubt;
     EXPECT_NE(place.doubt.find("where another fits as well"), std::string::npos) << place.doubt;
-    const double bay = place.T_odom_body.translation.z() / kBay;
+    const double bay = place.T_odom_body.translation.z() / test::kBay;
     EXPECT_LT(std::abs(bay - std::round(bay)), 0.1) << "in one of them, all the same";
     EXPECT_LT(std::abs(place.T_odom_body.translation.x()), 0.1);
   }

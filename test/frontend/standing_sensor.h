@@ -27,4 +27,14 @@ struct StandingSensor {
   }
 };
 
+/// A prediction that knows its pose so well [m, rad] and nothing else.
+inline FilterState predicted_at(const Pose& pose, double position_sigma, double attitude_sigma) {
+  FilterState filter;
+  filter.nominal.T_odom_body = pose;
+  filter.covariance.setIdentity();
+  filter.covariance.diagonal().segment<3>(kAttitude).setConstant(attitude_sigma * attitude_sigma);
+  filter.covariance.diagonal().segment<3>(kPosition).setConstant(position_sigma * position_sigma);
+  return filter;
+}
+
 }  // namespace ignis::test

@@ -225,6 +225,17 @@ World bent_corridor(double radius_m) {
   return world;
 }
 
+World bays() {
+  World world;
+  world.room = {{-4.0, -0.6, -200.0}, {4.0, 3.0, 200.0}};
+  for (int bay = -100; bay <= 100; ++bay) {
+    const double z = kBay * (bay + 0.5);
+    world.boxes.push_back({{-4.0, -0.6, z - 0.15}, {-2.5, 3.0, z + 0.15}});
+    world.boxes.push_back({{2.5, -0.6, z - 0.15}, {4.0, 3.0, z + 0.15}});
+  }
+  return world;
+}
+
 World street() {
   World world;
   world.room = {{-12.0, -1.7, -320.0}, {14.0, 60.0, 120.0}};

@@ -81,6 +81,9 @@ struct Drive {
 [[nodiscard]] World bare_corridor();
 /// The same bent about an upright axis `radius_m` to the left of its middle.
 [[nodiscard]] World bent_corridor(double radius_m);
+/// Bays of kBay along a hall of 8 m x 3.6 m whose ends are out of sight.
+[[nodiscard]] World bays();
+inline constexpr double kBay = 1.5;  // m
 /// A street with facades, parked cars and poles, 200 m long.
 [[nodiscard]] World street();
 
