@@ -15,6 +15,7 @@ constexpr int kScansToConfirmMotion = 40;                       // of an L1, as 
 constexpr int kScansToConfirmSession = 60;                      // and something to go on
 constexpr Utime kMostLeadUs = 2 * kMicrosPerSecond;             // of a command to begin anew
 constexpr Utime kHandOverUs = 150'000;                          // a scan comes later than the sample at its end
+constexpr Utime kMostGatheringUs = kMicrosPerSecond;            // of first scans, which come with gaps
 constexpr std::int64_t kAskingPeriodUs = 3 * kMicrosPerSecond;  // of scans, which takes a quarter of it
 
 /// The position from which a new map begins is exact by definition.
@@ -74,7 +75,7 @@ ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
 
 void Lio::start(const FilterState& first) {
   filter_ = first;
-  if (config_.start == "at_rest" && config_.use_scan_matching) ask_scans_for_motion();
+  if (config_.start == "at_rest" && config_.use_scan_matching) ask_scans_or_wait();
   start_motion_ = StartMotion(config_);  // its memory is needed no more
   cautious_ = filter_.covariance;
   live_ = filter_.nominal;
@@ -82,7 +83,7 @@ void Lio::start(const FilterState& first) {
   last_correction_ = first.nominal.utime;
   velocity_known_ = config_.start == "at_rest";
   drift_ = MapDrift(config_.map_drift);
-  if (!start_note_.empty()) trust_.note_uncertain_start("new session", kScansToConfirmSession);
+  if (!start_note_.empty()) doubt_start();
   opinion_.begin(first.nominal.utime);
   drift_.begin(filter_);
 }
@@ -111,8 +112,49 @@ void Lio::start_moving(const FilterState& first) {
   start(found);
   velocity_known_ = true;
   mapped_velocity_variance_ = velocity_variance(filter_.covariance);
-  if (start_note_.empty()) trust_.note_uncertain_start(start_finding_, kScansToConfirmMotion);
+  doubt_start();
   rebuild_live_state();
+}
+
+void Lio::ask_scans_or_wait() {
+  awaits_scans_ = !start_motion_.has_scans();
+  if (!awaits_scans_) {
+    ask_scans_for_motion();
+    return;
+  }
+  start_finding_ = "no scans have come yet";
+  doubt_start();
+}
+
+/// Of a session that is not the first one it is told that it is new, and more has to confirm it.
+void Lio::doubt_start() {
+  const bool is_first = start_note_.empty();
+  trust_.note_uncertain_start(is_first ? start_finding_ : "new session",
+                              is_first ? kScansToConfirmMotion : kScansToConfirmSession);
+}
+
+/// Scans that begin after the start are asked what those before it would have told, unless the vehicle has left since:
+/// then the IMU knows more. True while they are not mapped yet.
+bool Lio::gathers_first_scans(const Scan& scan) {
+  if (!awaits_scans_) return false;
+  if (!gathering_since_) gathering_since_ = scan.end_utime();
+  start_motion_.add(scan);
+  follow_to(scan.end_utime());
+  use_standstill();
+  const bool stands = last_standstill_ && scan.end_utime() - *last_standstill_ < kMostGatheringUs;
+  const bool complete =
+      start_motion_.has_window_until(scan.end_utime()) || scan.end_utime() - *gathering_since_ > kMostGatheringUs;
+  if (stands && !complete) return true;
+  awaits_scans_ = false;
+  if (stands) {
+    trust_.forget_uncertain_start();
+    ask_scans_for_motion();
+    if (!start_note_.empty()) doubt_start();
+  }
+  start_motion_ = StartMotion(config_);
+  const bool is_rolling = !map_.empty();
+  if (is_rolling) cautious_ = filter_.covariance;
+  return is_rolling;
 }
 
 /// The IMU was quiet, as at any constant speed. A vehicle that rolls begins with the map that its scans agree on: on
@@ -122,7 +164,7 @@ void Lio::ask_scans_for_motion() {
   const std::optional<SteadyMotion> motion = start_motion_.find();
   start_finding_ = motion ? describe(*motion) : "scans do not tell whether it stood";
   if (motion && !motion->is_rolling()) return;
-  trust_.note_uncertain_start(start_finding_, kScansToConfirmMotion);
+  doubt_start();
   if (!motion) return;
   set_rolling(filter_, *motion, config_.gravity_m);
   start_motion_.fill(map_, *motion, filter_.nominal.utime, filter_.nominal.T_odom_body);

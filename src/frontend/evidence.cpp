@@ -52,20 +52,21 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
 }
 
 /// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
-void Lio::use_standstill(ScanStats& stats) {
-  if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return;
-  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_);
-  if (!standstill) return;
-  stats.standing = true;
-  if (learns_nothing()) return;
+bool Lio::use_standstill() {
+  if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return false;
+  const Unless unless = awaits_scans_ ? Unless::kItMustRoll : Unless::kItMayRoll;  // the first scans will be asked
+  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_, unless);
+  if (!standstill) return false;
   // Windows that overlap share the noise of their samples.
-  if (last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2) return;
+  const bool overlaps = last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2;
+  if (learns_nothing() || overlaps) return true;
   last_standstill_ = filter_.nominal.utime;
   FilterState cautious{filter_.nominal, cautious_};
   correct_to_standstill(cautious, *standstill);
   cautious_ = cautious.covariance;
   correct_to_standstill(filter_, *standstill);
   keyframer_.add_standstill(*standstill);
+  return true;
 }
 
 }  // namespace ignis

@@ -48,6 +48,8 @@ void Lio::reset() {
   initialisation_ = ImuInitialisation(config_);
   start_motion_ = StartMotion(config_);
   start_finding_.clear();
+  awaits_scans_ = false;
+  gathering_since_.reset();
   last_asked_.reset();
   matcher_ = ScanMatcher(config_);
   map_.clear();
@@ -121,7 +123,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   }
   std::ranges::move(process_pending(), std::back_inserter(result.scans));
   if (running_) {
-    advance_to(sample.utime - to_micros(config_.max_scan_delay_s));
+    commit_to(sample.utime - to_micros(config_.max_scan_delay_s));
     result.state = live_;
   }
   forget_old_samples();
@@ -212,7 +214,8 @@ ScanResult Lio::process(const Scan& scan) {
   if (scan.end_utime() < filter_.nominal.utime) {
     return refuse(scan, applied_scans_ == 0 ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
   }
-  advance_to(scan.end_utime());
+  if (gathers_first_scans(scan)) return refuse(scan, ScanReason::kNotInitialised);
+  follow_to(scan.end_utime());
   const ScanSelection& selection = selector_.select(scan);
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
@@ -228,7 +231,7 @@ ScanResult Lio::process(const Scan& scan) {
     cloud = register_points(selection.scan);
     sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
   }
-  use_standstill(match.stats);
+  match.stats.standing = use_standstill();
   note_evidence(predicted, match.stats, scan);
   heed_second_opinion(predicted, match);
   seek_confirmation(match.stats.reason);

@@ -117,14 +117,19 @@ class Lio {
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
   void begin_new_map();
   void coast_to(Utime utime);
-  void use_standstill(ScanStats& stats);
+  bool use_standstill();
   [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan);
   [[nodiscard]] bool learns_nothing() const;
   void keep_biases(const FilterState& predicted);
   void advance_to(Utime utime);
+  void follow_to(Utime utime);
+  void commit_to(Utime utime);
   void start(const FilterState& first);
   void start_moving(const FilterState& first);
   [[nodiscard]] std::string start_text() const;
+  void ask_scans_or_wait();
+  void doubt_start();
+  [[nodiscard]] bool gathers_first_scans(const Scan& scan);
   void ask_scans_for_motion();
   [[nodiscard]] bool ends_with(Utime sample) const;
   void begin_anew();
@@ -150,9 +155,11 @@ class Lio {
   std::int32_t session_ = 0;
   ImuBuffer imu_;
   ImuInitialisation initialisation_;
-  StartMotion start_motion_;         ///< until the start
-  std::string start_finding_;        ///< what scans said of the motion then
-  std::optional<Utime> last_asked_;  ///< instant at which scans did not tell how fast the vehicle goes
+  StartMotion start_motion_;              ///< until the start, or while first scans are gathered
+  bool awaits_scans_ = false;             ///< none had come at the start
+  std::optional<Utime> gathering_since_;  ///< end of the first of them
+  std::string start_finding_;             ///< what scans said of the motion then
+  std::optional<Utime> last_asked_;       ///< instant at which scans did not tell how fast the vehicle goes
   ScanSelector selector_;
   Deskewer deskewer_;
   VoxelThinner thinner_;

@@ -6,6 +6,7 @@
 
 #include "frontend/error_step.h"
 #include "frontend/lio.h"
+#include "frontend/standstill.h"
 #include "frontend/steady_motion.h"
 
 namespace ignis {
@@ -14,6 +15,7 @@ namespace {
 constexpr std::int64_t kHistoryUs = 3 * kMicrosPerSecond;  // IMU kept to deskew with and to dead reckon from
 constexpr std::int64_t kCoastingStepUs = 10'000;           // between samples that stand in for a silent IMU
 constexpr std::int64_t kClipMemoryUs = kMicrosPerSecond;   // after a clipped sample the biases learn nothing
+constexpr Utime kCommitStepUs = kStandstillWindowUs / 2;   // of the committed state while no scan leads it
 constexpr double kSaturatedNoiseScale = 1e4;               // a clipped axis may be off by any amount
 
 /// Calls `step(next, input, dt)` for each piece of the line through the samples from `now` to `until`; `now` follows.
@@ -44,6 +46,20 @@ void Lio::advance_to(Utime utime) {
                   filter_.nominal = predict_nominal(filter_.nominal, input, dt, config_.gravity_m);
                 });
   if (unaided_) unaided_->nominal.utime = filter_.nominal.utime;
+}
+
+/// A LiDAR may begin seconds after the IMU: until it does, nothing but standing keeps the origin where it is.
+void Lio::follow_to(Utime utime) {
+  while (awaits_scans_ && utime - filter_.nominal.utime >= kCommitStepUs) {
+    advance_to(filter_.nominal.utime + kCommitStepUs);
+    if (use_standstill()) rebuild_live_state();
+  }
+  advance_to(utime);
+}
+
+/// To an instant before which no scan is waited for any more.
+void Lio::commit_to(Utime utime) {
+  if (utime - filter_.nominal.utime >= kCommitStepUs) follow_to(utime);
 }
 
 /// The state of the committed instant without anything but the IMU since then.

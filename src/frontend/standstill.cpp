@@ -98,17 +98,25 @@ bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, con
   return acceleration.norm() > kSigmas * sigma;
 }
 
+/// A vehicle that stands without scans that hold it is seen to move by the noise of its IMU. Once the limit is missed
+/// nothing stops that any more, so it must be a rare noise.
+bool hardly_moves(const FilterState& filter, const FrontendConfig& config) {
+  const double sigma = largest_sigma(filter.covariance, kVelocity);
+  const double limit = std::min(config.stationary_speed + kSigmas * sigma, 4.0 * config.stationary_speed);
+  return sigma <= kMaxVelocitySigma && filter.nominal.v_odom.norm() <= limit;
+}
+
+bool may_stand(const FilterState& filter, const FrontendConfig& config) {
+  const double sigma = largest_sigma(filter.covariance, kVelocity);
+  return filter.nominal.v_odom.norm() <= config.stationary_speed + kSigmas * sigma;
+}
+
 }  // namespace
 
 std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
-                                          const FrontendConfig& config) {
+                                          const FrontendConfig& config, Unless unless) {
   const NavState& state = filter.nominal;
-  // A vehicle that stands without scans that hold it is seen to move by the noise of its IMU. Once the limit is missed
-  // nothing stops that any more, so it must be a rare noise.
-  const double velocity_sigma = largest_sigma(filter.covariance, kVelocity);
-  const double speed_limit =
-      std::min(config.stationary_speed + kSigmas * velocity_sigma, 4.0 * config.stationary_speed);
-  if (velocity_sigma > kMaxVelocitySigma || state.v_odom.norm() > speed_limit) return std::nullopt;
+  if (unless == Unless::kItMayRoll ? !hardly_moves(filter, config) : !may_stand(filter, config)) return std::nullopt;
 
   const auto begin = std::ranges::lower_bound(samples, state.utime - kStandstillWindowUs, {}, &ImuSample::utime);
   const auto newest = std::ranges::lower_bound(samples, state.utime - kDelayUs, {}, &ImuSample::utime);

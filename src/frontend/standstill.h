@@ -22,11 +22,18 @@ struct Standstill {
   Vector6d variance = Vector6d::Zero();              ///< of IMU noise and of `zero_velocity_sigma`
 };
 
+/// What rules out that a quiet vehicle stands.
+enum class Unless : std::int8_t {
+  kItMayRoll,   ///< the filter is not sure that it hardly moves
+  kItMustRoll,  ///< the filter is sure that it moves; a wrong zero has to be found by others
+};
+
 /// Something when the vehicle stood during the half second before `filter.nominal.utime`: IMU quiet within the
-/// limits of a start at rest, no turn, no acceleration, and the filter is sure that it hardly moves. A steady drive on
-/// a smooth floor is as quiet as standing, so the IMU alone never decides.
+/// limits of a start at rest, no turn, no acceleration, and the filter agrees. A steady drive on a smooth floor is as
+/// quiet as standing, so the IMU alone never decides.
 [[nodiscard]] std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
-                                                        const FrontendConfig& config);
+                                                        const FrontendConfig& config,
+                                                        Unless unless = Unless::kItMayRoll);
 
 /// Kalman update with the measurement "velocity and turn rate = 0" (zero-velocity update; I. Skog et al.,
 /// "Zero-velocity detection - an algorithm evaluation", IEEE TBME 57(11), 2010). Joseph form: the covariance stays

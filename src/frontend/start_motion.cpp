@@ -116,8 +116,10 @@ void StartMotion::add(const Scan& scan) {
 
 bool StartMotion::has_dense_scans() const { return newest_points_ >= kPointsThatSuffice; }
 
+bool StartMotion::has_scans() const { return scans_.size() >= kLeastScans; }
+
 bool StartMotion::has_window_until(Utime now) const {
-  return scans_.size() >= kLeastScans && seconds_between(newest(), now) < kFreshSeconds &&
+  return has_scans() && seconds_between(newest(), now) < kFreshSeconds &&
          seconds_between(scans_.front().utime, newest()) > kWindowSeconds - kFreshSeconds;
 }
 
@@ -272,7 +274,7 @@ bool StartMotion::rest_explains(std::span<const std::size_t> witnesses) {
 }
 
 std::optional<SteadyMotion> StartMotion::find() {
-  if (scans_.size() < kLeastScans) return std::nullopt;
+  if (!has_scans()) return std::nullopt;
   measure();
   const std::optional<Candidate> found = search();
   return found ? std::optional(told(*found)) : std::nullopt;
@@ -280,7 +282,7 @@ std::optional<SteadyMotion> StartMotion::find() {
 
 std::optional<BentMotion> StartMotion::find_beside(const NavState& standing, std::span<const ImuSample> samples,
                                                    double gravity_m) {
-  if (scans_.size() < kLeastScans) return std::nullopt;
+  if (!has_scans()) return std::nullopt;
   measure();
   Scan all;
   all.utime = scans_.front().utime;

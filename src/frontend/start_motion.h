@@ -38,6 +38,9 @@ class StartMotion {
   /// here.
   [[nodiscard]] bool has_dense_scans() const;
 
+  /// There are scans enough to be asked.
+  [[nodiscard]] bool has_scans() const;
+
   /// There are scans of all of the window, and they are those of the time until `now`.
   [[nodiscard]] bool has_window_until(Utime now) const;
 

@@ -71,6 +71,11 @@ void TrustMonitor::note_uncertain_start(std::string reason, int scans) {
   scans_to_confirm_ = scans;
 }
 
+void TrustMonitor::forget_uncertain_start() {
+  uncertain_start_.clear();
+  scans_to_confirm_ = 0;
+}
+
 void TrustMonitor::note_resumption() {
   resumed_ = true;
   scans_to_confirm_ = kScansToConfirm;

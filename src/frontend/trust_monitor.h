@@ -60,6 +60,8 @@ class TrustMonitor {
   /// A start in the middle of a drive, perhaps: to the IMU constant velocity looks like rest, and only scans tell. So
   /// many of them have to be applied. `reason` is for people.
   void note_uncertain_start(std::string reason, int scans);
+  /// The scans were asked after all.
+  void forget_uncertain_start();
 
   [[nodiscard]] Trust trust() const;
   /// Why the trust is not kOk; what happened last when it is.

@@ -77,6 +77,40 @@ TEST(LioGap, ScansThatBeginSecondsAfterTheStartAreBehindNoGap) {
   }
 }
 
+/// Scans of the first `late` seconds are missing.
+Drive with_late_scans(Drive drive, double late) {
+  const Utime begin = drive.imu.front().utime;
+  std::erase_if(drive.scans, [&](const Scan& scan) { return scan.utime < begin + to_micros(late); });
+  return drive;
+}
+
+TEST(LioGap, AVehicleThatStandsUntilScansComeIsWhereItBeganAndSure) {
+  for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+    const Drive whole =
+        test::simulate(test::furnished_hall(), test::ellipse_drive(25.0, 6.0, 4.0, 1.0), 30.0, {}, seed);
+    for (const double late : {2.0, 8.0, 22.0}) {
+      const Drive drive = with_late_scans(whole, late);
+      const LioRun run = test::run_lio(test::tuned_config(), drive);
+      const auto first = std::ranges::find_if(run.scans, &ScanResult::has_state);
+      ASSERT_NE(first, run.scans.end());
+      EXPECT_LT(first->state.T_odom_body.translation.norm(), 0.15) << late << " s, seed " << seed;
+      const Eigen::Matrix3d covariance = first->covariance.block<3, 3>(kPosition, kPosition);
+      EXPECT_LT(std::sqrt(covariance.diagonal().maxCoeff()), 0.1) << late << " s, seed " << seed;
+      EXPECT_EQ(std::next(first, 20)->trust, Trust::kOk) << late << " s, seed " << seed;
+      EXPECT_LT(test::end_error(run, drive), 0.15) << late << " s, seed " << seed;
+    }
+  }
+}
+
+TEST(LioGap, AVehicleThatRollsWhenScansComeLateGoesOnAtItsSpeed) {
+  for (const double speed : {0.3, 1.0}) {
+    const Drive whole = test::simulate(test::furnished_hall(), test::straight_drive(0.0, speed), 9.0, {}, 1);
+    const Drive drive = with_late_scans(whole, 3.0);
+    const LioRun run = test::run_lio(test::tuned_config(), drive);
+    EXPECT_NEAR(run.scans.back().state.v_odom.norm(), speed, 0.05) << run.status.reason;
+  }
+}
+
 TEST(LioGap, AmongBaysThatLookAlikeThePoseIsNotToldToBeBetterThanItIs) {
   int wrong = 0;
   for (std::uint32_t seed = 1; seed <= 8; ++seed) {
