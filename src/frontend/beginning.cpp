@@ -82,6 +82,7 @@ void Lio::start(const FilterState& first) {
   running_ = true;
   last_correction_ = first.nominal.utime;
   velocity_known_ = config_.start == "at_rest";
+  has_set_off_ = config_.start != "at_rest";
   drift_ = MapDrift(config_.map_drift);
   if (!start_note_.empty()) doubt_start();
   opinion_.begin(first.nominal.utime);

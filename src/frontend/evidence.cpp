@@ -51,19 +51,24 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   trust_.note_contradiction();
 }
 
-/// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow.
+/// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow. A vehicle that
+/// stood goes on standing until the filter is sure that it has set off, and before the first scans in any case: they
+/// will be asked.
 bool Lio::use_standstill() {
   if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return false;
-  const Unless unless = awaits_scans_ ? Unless::kItMustRoll : Unless::kItMayRoll;  // the first scans will be asked
-  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), filter_, config_, unless);
+  const FilterState cautious{filter_.nominal, cautious_};
+  has_set_off_ = !awaits_scans_ && (has_set_off_ || must_move(cautious, config_));
+  const Unless unless = has_set_off_ ? Unless::kItMayRoll : Unless::kItMustRoll;
+  const std::optional<Standstill> standstill = find_standstill(imu_.samples(), cautious, config_, unless);
   if (!standstill) return false;
+  has_set_off_ = false;
   // Windows that overlap share the noise of their samples.
   const bool overlaps = last_standstill_ && filter_.nominal.utime - *last_standstill_ < kStandstillWindowUs / 2;
   if (learns_nothing() || overlaps) return true;
   last_standstill_ = filter_.nominal.utime;
-  FilterState cautious{filter_.nominal, cautious_};
-  correct_to_standstill(cautious, *standstill);
-  cautious_ = cautious.covariance;
+  FilterState corrected = cautious;
+  correct_to_standstill(corrected, *standstill);
+  cautious_ = corrected.covariance;
   correct_to_standstill(filter_, *standstill);
   keyframer_.add_standstill(*standstill);
   return true;

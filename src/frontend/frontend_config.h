@@ -250,7 +250,7 @@ struct FrontendConfig {
                  "scans of this time make a keyframe's cloud");
     visit.number("max_scan_delay_s", self.max_scan_delay_s, {0.05, 10.0}, "s", "IMU history kept for late scans");
     visit.number("stationary_speed", self.stationary_speed, {1e-3, 1.0}, "m/s",
-                 "slower counts as standing; up to four times that while the velocity is uncertain");
+                 "slower counts as standing, up to three sigma; four times that, two sigma included, after a drive");
     visit.number("zero_velocity_sigma", self.zero_velocity_sigma, {0.0, 1.0}, "m/s",
                  "what standing says about the velocity, four times a second; 0: standing is not used");
     visit.number("scan_voxel_m", self.scan_voxel_m, {0.0, 5.0}, "m",

@@ -11,8 +11,9 @@
 namespace ignis {
 namespace {
 
-constexpr double kMaxVelocitySigma = 0.1;  // m/s: above it the filter cannot tell standing from rolling
 constexpr double kSigmas = 3.0;
+constexpr double kSigmasToBelieve = 2.0;
+constexpr double kHardlyMoving = 4.0;      // times stationary_speed
 constexpr std::ptrdiff_t kMinSamples = 4;  // that a quiet window needs
 constexpr Utime kLongWindowUs = 9 * (kMicrosPerSecond / 10);
 constexpr Utime kDelayUs = 2 * (kMicrosPerSecond / 10);  // between standing and the correction that it leads to
@@ -98,25 +99,25 @@ bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, con
   return acceleration.norm() > kSigmas * sigma;
 }
 
-/// A vehicle that stands without scans that hold it is seen to move by the noise of its IMU. Once the limit is missed
-/// nothing stops that any more, so it must be a rare noise.
+/// After a drive: two sigma more would still be hardly a motion. What was felt when it set off may by chance come to
+/// little while the vehicle goes on, and where scans do not see the way nothing puts a wrong zero right.
 bool hardly_moves(const FilterState& filter, const FrontendConfig& config) {
   const double sigma = largest_sigma(filter.covariance, kVelocity);
-  const double limit = std::min(config.stationary_speed + kSigmas * sigma, 4.0 * config.stationary_speed);
-  return sigma <= kMaxVelocitySigma && filter.nominal.v_odom.norm() <= limit;
-}
-
-bool may_stand(const FilterState& filter, const FrontendConfig& config) {
-  const double sigma = largest_sigma(filter.covariance, kVelocity);
-  return filter.nominal.v_odom.norm() <= config.stationary_speed + kSigmas * sigma;
+  return !must_move(filter, config) &&
+         filter.nominal.v_odom.norm() + kSigmasToBelieve * sigma <= kHardlyMoving * config.stationary_speed;
 }
 
 }  // namespace
 
+bool must_move(const FilterState& filter, const FrontendConfig& config) {
+  const double sigma = largest_sigma(filter.covariance, kVelocity);
+  return filter.nominal.v_odom.norm() > config.stationary_speed + kSigmas * sigma;
+}
+
 std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
                                           const FrontendConfig& config, Unless unless) {
   const NavState& state = filter.nominal;
-  if (unless == Unless::kItMayRoll ? !hardly_moves(filter, config) : !may_stand(filter, config)) return std::nullopt;
+  if (unless == Unless::kItMayRoll ? !hardly_moves(filter, config) : must_move(filter, config)) return std::nullopt;
 
   const auto begin = std::ranges::lower_bound(samples, state.utime - kStandstillWindowUs, {}, &ImuSample::utime);
   const auto newest = std::ranges::lower_bound(samples, state.utime - kDelayUs, {}, &ImuSample::utime);

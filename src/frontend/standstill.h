@@ -22,10 +22,13 @@ struct Standstill {
   Vector6d variance = Vector6d::Zero();              ///< of IMU noise and of `zero_velocity_sigma`
 };
 
+/// The filter is sure that the vehicle is not at rest.
+[[nodiscard]] bool must_move(const FilterState& filter, const FrontendConfig& config);
+
 /// What rules out that a quiet vehicle stands.
 enum class Unless : std::int8_t {
   kItMayRoll,   ///< the filter is not sure that it hardly moves
-  kItMustRoll,  ///< the filter is sure that it moves; a wrong zero has to be found by others
+  kItMustRoll,  ///< the filter is sure that it moves
 };
 
 /// Something when the vehicle stood during the half second before `filter.nominal.utime`: IMU quiet within the

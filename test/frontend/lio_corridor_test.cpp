@@ -63,6 +63,28 @@ TEST(LioCorridor, AnEndInSightHoldsTheAxis) {
   }
 }
 
+/// At rest for 3 s, then at 0.4 m/s after 0.8 s.
+Pose crawl(double t) {
+  constexpr double kAcceleration = 0.5;
+  const double driving = std::max(t - 3.0, 0.0);
+  const double rise = std::min(driving, 0.8);
+  return {Eigen::Quaterniond::Identity(), {0.0, 0.0, -kAcceleration * rise * (driving - 0.5 * rise)}};
+}
+
+TEST(LioCorridor, ASlowDriveThatNoScanSeesIsNotTakenForStanding) {
+  int standing = 0;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    test::Sensors sensors;
+    sensors.range_sigma = 0.02;
+    const Drive drive = test::simulate(test::bare_corridor(), crawl, 8.0, sensors, seed);
+    const LioRun run = test::run_lio(test::tuned_config(), drive);
+    const Eigen::Vector3d velocity = run.scans.back().state.v_odom;
+    const Eigen::Matrix3d covariance = run.scans.back().covariance.block<3, 3>(kVelocity, kVelocity);
+    standing += velocity.norm() < 0.1 && covariance(2, 2) < 0.05 * 0.05 ? 1 : 0;
+  }
+  EXPECT_LE(standing, 1) << "three before";
+}
+
 /// No scans from 4 to 9 s: some 0.7 m of uncertainty come together on the way.
 Drive drive_with_a_gap(std::uint32_t seed) {
   Drive drive = drive_in(closed_corridor(14.0), seed, 13.0);
