@@ -75,6 +75,7 @@ ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
 
 void Lio::start(const FilterState& first) {
   filter_ = first;
+  has_set_off_ = config_.start != "at_rest";
   if (config_.start == "at_rest" && config_.use_scan_matching) ask_scans_or_wait();
   start_motion_ = StartMotion(config_);  // its memory is needed no more
   cautious_ = filter_.covariance;
@@ -82,7 +83,6 @@ void Lio::start(const FilterState& first) {
   running_ = true;
   last_correction_ = first.nominal.utime;
   velocity_known_ = config_.start == "at_rest";
-  has_set_off_ = config_.start != "at_rest";
   drift_ = MapDrift(config_.map_drift);
   if (!start_note_.empty()) doubt_start();
   opinion_.begin(first.nominal.utime);
@@ -118,7 +118,8 @@ void Lio::start_moving(const FilterState& first) {
 }
 
 void Lio::ask_scans_or_wait() {
-  awaits_scans_ = !start_motion_.has_scans();
+  const bool has_scans = start_motion_.has_scans() && filter_.nominal.utime - start_motion_.newest() < kMostGatheringUs;
+  awaits_scans_ = !has_scans;
   if (!awaits_scans_) {
     ask_scans_for_motion();
     return;
@@ -141,12 +142,14 @@ bool Lio::gathers_first_scans(const Scan& scan) {
   if (!gathering_since_) gathering_since_ = scan.end_utime();
   start_motion_.add(scan);
   follow_to(scan.end_utime());
-  use_standstill();
-  const bool stands = last_standstill_ && scan.end_utime() - *last_standstill_ < kMostGatheringUs;
+  const bool is_quiet = use_standstill();
+  const bool stands = is_quiet || (last_standstill_ && scan.end_utime() - *last_standstill_ < kMostGatheringUs);
   const bool complete =
       start_motion_.has_window_until(scan.end_utime()) || scan.end_utime() - *gathering_since_ > kMostGatheringUs;
   if (stands && !complete) return true;
   awaits_scans_ = false;
+  last_correction_ = filter_.nominal.utime;  // the map begins here
+  opinion_.begin(filter_.nominal.utime);
   if (stands) {
     trust_.forget_uncertain_start();
     ask_scans_for_motion();
@@ -167,6 +170,7 @@ void Lio::ask_scans_for_motion() {
   if (motion && !motion->is_rolling()) return;
   doubt_start();
   if (!motion) return;
+  has_set_off_ = true;
   set_rolling(filter_, *motion, config_.gravity_m);
   start_motion_.fill(map_, *motion, filter_.nominal.utime, filter_.nominal.T_odom_body);
   mapped_velocity_variance_ = velocity_variance(filter_.covariance);

@@ -8,6 +8,11 @@
 #include "frontend/standstill.h"
 
 namespace ignis {
+namespace {
+
+constexpr double kSigmasToHaveLeft = 5.0;  // before the first scan
+
+}  // namespace
 
 void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan) {
   stats.utime = scan.end_utime();
@@ -52,12 +57,13 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
 }
 
 /// At rest velocity is known better than any scan tells, and with it the tilt that would make it grow. A vehicle that
-/// stood goes on standing until the filter is sure that it has set off, and before the first scans in any case: they
-/// will be asked.
+/// stood goes on standing until it may have set off. Before the first scans, which will be asked, it must have.
 bool Lio::use_standstill() {
   if (config_.zero_velocity_sigma <= 0.0 || !velocity_known_) return false;
   const FilterState cautious{filter_.nominal, cautious_};
-  has_set_off_ = !awaits_scans_ && (has_set_off_ || must_move(cautious, config_));
+  const bool sets_off = awaits_scans_ ? must_move(cautious, config_, kSigmasToHaveLeft)
+                                      : must_move(cautious, config_) || may_move(cautious);
+  has_set_off_ = has_set_off_ || sets_off;
   const Unless unless = has_set_off_ ? Unless::kItMayRoll : Unless::kItMustRoll;
   const std::optional<Standstill> standstill = find_standstill(imu_.samples(), cautious, config_, unless);
   if (!standstill) return false;

@@ -183,7 +183,7 @@ class Lio {
   int applied_scans_ = 0;
   int contradictions_ = 0;                ///< in a row
   std::optional<Utime> last_correction_;  ///< none: nobody knows how far the map lies from the points
-  bool has_set_off_ = true;               ///< since a start at rest
+  bool has_set_off_ = true;               ///< since it was last told to stand
   std::optional<Utime> last_standstill_;  ///< instant of the last correction to zero velocity
   std::optional<Utime> last_clipped_;     ///< instant of the newest sample that says nothing about the biases
   std::optional<Utime> resumed_from_;     ///< newest sample of the predecessor, until the first own one

@@ -56,7 +56,10 @@ Lio::Silence Lio::bridge_silence(Utime before, Utime sample, std::vector<ScanRes
   return Silence::kBridged;
 }
 
-bool Lio::can_be_resumed() const { return running_ && velocity_known_ && !trust_.awaits_confirmation(); }
+/// Without a map there is nothing that scans could confirm.
+bool Lio::can_be_resumed() const {
+  return running_ && velocity_known_ && !awaits_scans_ && !trust_.awaits_confirmation();
+}
 
 bool Lio::is_sound() const {
   ErrorCovariance covariance = filter_.covariance;

@@ -14,6 +14,7 @@ namespace {
 constexpr double kSigmas = 3.0;
 constexpr double kSigmasToBelieve = 2.0;
 constexpr double kHardlyMoving = 4.0;      // times stationary_speed
+constexpr double kVagueVelocity = 0.1;     // m/s
 constexpr std::ptrdiff_t kMinSamples = 4;  // that a quiet window needs
 constexpr Utime kLongWindowUs = 9 * (kMicrosPerSecond / 10);
 constexpr Utime kDelayUs = 2 * (kMicrosPerSecond / 10);  // between standing and the correction that it leads to
@@ -109,10 +110,12 @@ bool hardly_moves(const FilterState& filter, const FrontendConfig& config) {
 
 }  // namespace
 
-bool must_move(const FilterState& filter, const FrontendConfig& config) {
+bool must_move(const FilterState& filter, const FrontendConfig& config, double sigmas) {
   const double sigma = largest_sigma(filter.covariance, kVelocity);
-  return filter.nominal.v_odom.norm() > config.stationary_speed + kSigmas * sigma;
+  return filter.nominal.v_odom.norm() > config.stationary_speed + sigmas * sigma;
 }
+
+bool may_move(const FilterState& filter) { return largest_sigma(filter.covariance, kVelocity) > kVagueVelocity; }
 
 std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
                                           const FrontendConfig& config, Unless unless) {

@@ -22,8 +22,11 @@ struct Standstill {
   Vector6d variance = Vector6d::Zero();              ///< of IMU noise and of `zero_velocity_sigma`
 };
 
-/// The filter is sure that the vehicle is not at rest.
-[[nodiscard]] bool must_move(const FilterState& filter, const FrontendConfig& config);
+/// The filter is sure, by so many sigma, that the vehicle is not at rest.
+[[nodiscard]] bool must_move(const FilterState& filter, const FrontendConfig& config, double sigmas = 3.0);
+
+/// The velocity is known so badly that nobody can tell standing from rolling.
+[[nodiscard]] bool may_move(const FilterState& filter);
 
 /// What rules out that a quiet vehicle stands.
 enum class Unless : std::int8_t {

@@ -26,6 +26,8 @@ void set_rolling(FilterState& first, const SteadyMotion& motion, double gravity_
   first.nominal.angular_rate += turn;
   first.nominal.v_odom = R * velocity;
   first.covariance.block<3, 3>(kGyroBias, kGyroBias) += motion.covariance.topLeftCorner<3, 3>();
+  first.covariance.middleRows<3>(kVelocity).setZero();
+  first.covariance.middleCols<3>(kVelocity).setZero();
   first.covariance.block<3, 3>(kVelocity, kVelocity) = R * motion.covariance.bottomRightCorner<3, 3>() * R.transpose();
   const double tilt = turn.cross(velocity).norm() / gravity_m;
   first.covariance.diagonal().segment<2>(kGravityTilt).array() += tilt * tilt;
