@@ -118,14 +118,13 @@ void Lio::start_moving(const FilterState& first) {
 }
 
 void Lio::ask_scans_or_wait() {
-  const bool has_scans = start_motion_.has_scans() && filter_.nominal.utime - start_motion_.newest() < kMostGatheringUs;
-  awaits_scans_ = !has_scans;
-  if (!awaits_scans_) {
+  awaits_scans_ = !start_motion_.has_scans() || filter_.nominal.utime - start_motion_.newest() >= kMostGatheringUs;
+  if (awaits_scans_) {
+    start_finding_ = "no scans have come yet";
+    doubt_start();
+  } else {
     ask_scans_for_motion();
-    return;
   }
-  start_finding_ = "no scans have come yet";
-  doubt_start();
 }
 
 /// Of a session that is not the first one it is told that it is new, and more has to confirm it.

@@ -117,6 +117,7 @@ class Lio {
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
   void begin_new_map();
   void coast_to(Utime utime);
+  /// Whether the vehicle stands at the committed instant.
   bool use_standstill();
   [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan);
   [[nodiscard]] bool learns_nothing() const;

@@ -58,8 +58,8 @@ struct ScanStats {
   int nis_directions = 0;
   bool standing = false;          ///< the vehicle stands
   double imu_disagreement = 0.0;  ///< [sigma] by which scans and IMU disagree about the last two seconds
-  std::string
-      unobserved;      ///< these directions in words, see describe(), and why the place is doubtful, see reacquire()
+  /// These directions in words, see describe(), and why the place is doubtful, see reacquire().
+  std::string unobserved;
   Pose T_odom_body;    ///< after this scan
   int map_points = 0;  ///< in the local map, after this scan
 

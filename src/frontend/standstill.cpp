@@ -11,7 +11,6 @@
 namespace ignis {
 namespace {
 
-constexpr double kSigmas = 3.0;
 constexpr double kSigmasToBelieve = 2.0;
 constexpr double kHardlyMoving = 4.0;      // times stationary_speed
 constexpr double kVagueVelocity = 0.1;     // m/s
@@ -97,7 +96,7 @@ bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, con
   const double noise = config.imu_noise_accel / std::sqrt(seconds);
   const double sigma =
       std::hypot(noise, std::sqrt(rest_acceleration_covariance(filter, config.gravity_m).diagonal().maxCoeff()));
-  return acceleration.norm() > kSigmas * sigma;
+  return acceleration.norm() > kStandstillSigmas * sigma;
 }
 
 /// After a drive: two sigma more would still be hardly a motion. What was felt when it set off may by chance come to
@@ -132,9 +131,9 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
   const Quiet quiet = summarise(window);
   const double seconds = 1e-6 * static_cast<double>(kStandstillWindowUs);
   const double gyro_limit =
-      kSigmas * (config.imu_noise_gyro / std::sqrt(seconds) + largest_sigma(filter.covariance, kGyroBias));
+      kStandstillSigmas * (config.imu_noise_gyro / std::sqrt(seconds) + largest_sigma(filter.covariance, kGyroBias));
   // The noise of a mean over half the window, twice: the difference of two such means.
-  const double drift_limit = kSigmas * config.imu_noise_accel * std::sqrt(4.0 / seconds);
+  const double drift_limit = kStandstillSigmas * config.imu_noise_accel * std::sqrt(4.0 / seconds);
   const bool still = quiet.gyro_sigma <= config.rest_gyro_sigma && quiet.accel_sigma <= config.rest_accel_sigma &&
                      (quiet.gyro - state.gyro_bias).norm() <= gyro_limit && quiet.accel_drift.norm() <= drift_limit &&
                      std::abs((quiet.accel - state.accel_bias).norm() - config.gravity_m) <= config.rest_accel_band;

@@ -12,6 +12,9 @@ namespace ignis {
 /// Windows of this length have to be quiet; between two corrections there is half of one.
 inline constexpr Utime kStandstillWindowUs = kMicrosPerSecond / 2;
 
+/// What noise may explain, of the inertial unit and of the velocity.
+inline constexpr double kStandstillSigmas = 3.0;
+
 /// What standing says: the velocity was zero a fifth of a second ago, so that a vehicle which has just set off is not
 /// held back before its acceleration shows, and so was the turn rate over the half window before that. Order of rows:
 /// velocity (odom axes) [m/s], turn rate (body axes) [rad/s].
@@ -23,7 +26,8 @@ struct Standstill {
 };
 
 /// The filter is sure, by so many sigma, that the vehicle is not at rest.
-[[nodiscard]] bool must_move(const FilterState& filter, const FrontendConfig& config, double sigmas = 3.0);
+[[nodiscard]] bool must_move(const FilterState& filter, const FrontendConfig& config,
+                             double sigmas = kStandstillSigmas);
 
 /// The velocity is known so badly that nobody can tell standing from rolling.
 [[nodiscard]] bool may_move(const FilterState& filter);
