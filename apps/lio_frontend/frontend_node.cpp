@@ -19,6 +19,7 @@ constexpr int kPollMs = 100;
 constexpr int kRequestQueue = 100;
 // In one answer, so that the live flow goes on: of the clouds that a map asks for at a time, and of their keyframes.
 constexpr std::size_t kMostResentParts = 36;
+constexpr double kSilence_s = 1.0;
 constexpr Utime kCheckpointPeriod = 400'000;  // [us]
 
 /// Calls `work` and returns its result with the wall time it took [ms].
@@ -41,8 +42,8 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
     checkpoints_ = std::make_unique<CheckpointFolder>(checkpoint_folder);
     resume();
   }
-  imu_counts_ =
-      &link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue, [this](const imu_t& message) { on_imu(message); });
+  link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue,
+                         [this](const imu_t& message) { return on_imu(message); });
   scan_counts_ = &link_.subscribe<scan_t>(channels::kScan, config_.lcm.scan_queue,
                                           [this](const scan_t& part) { on_scan_part(part); });
   request_counts_ = &link_.subscribe<keyframe_request_t>(
@@ -89,18 +90,17 @@ void FrontendNode::spin_once() {
   publish_health();
 }
 
-void FrontendNode::on_imu(const imu_t& message) {
+const char* FrontendNode::on_imu(const imu_t& message) {
   const auto [result, milliseconds] = timed([&] { return lio_.add_imu(messages::from_message(message)); });
-  if (result.fault == ImuFault::kNone) {
-    newest_utime_ = message.utime;
-  } else {
-    ++imu_counts_->rejected;
-  }
+  if (result.fault != ImuFault::kNone) return text(result.fault);
+  newest_utime_ = message.utime;
+  imu_heard_ = std::chrono::steady_clock::now();
   publish(result.scans, milliseconds);
   keep_end_of_session();
-  if (!result.state) return;
+  if (!result.state) return "";
   const std::optional<Matrix15d> owed = order_.take_sample(lio_.session(), result.state->utime);
   publish_state(*result.state, lio_.session(), owed ? &*owed : nullptr);
+  return "";
 }
 
 void FrontendNode::on_scan_part(const scan_t& part) {
@@ -196,12 +196,21 @@ void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
   }
 }
 
+/// Lio's clock is the sensor's: it does not hear that nothing comes any more.
+void FrontendNode::tell_silence(LioStatus& status) const {
+  const std::chrono::duration<double> silence = std::chrono::steady_clock::now() - imu_heard_;
+  if (!status.running || silence.count() < kSilence_s) return;
+  status.trust = std::max(status.trust, Trust::kDegraded);
+  status.reason = std::format("no IMU data for {:.0f} s, the pose stands still", silence.count());
+}
+
 void FrontendNode::publish_health() {
   if (lio_.start_note() != told_note_) {
     told_note_ = lio_.start_note();
     std::cerr << "lio_frontend: " << told_note_ << std::endl;
   }
   LioStatus status = lio_.status();
+  tell_silence(status);
   if (checkpoints_ && !checkpoints_->failure().empty()) {
     status.trust = std::max(status.trust, Trust::kDegraded);
     status.reason += "; " + checkpoints_->failure();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -32,7 +33,7 @@ class FrontendNode {
   void spin_once();
 
  private:
-  void on_imu(const imu_t& message);
+  const char* on_imu(const imu_t& message);
   void on_scan_part(const scan_t& part);
   void on_request(const keyframe_request_t& request);
   void on_cloud_request(const keyframe_request_t& request);
@@ -43,6 +44,7 @@ class FrontendNode {
   void publish_keyframe(const Keyframe& keyframe);
   void publish(std::span<const ScanResult> scans, double milliseconds);
   void publish_health();
+  void tell_silence(LioStatus& status) const;
   void resume();
   void keep(std::span<const ScanResult> scans);
   void keep_end_of_session();
@@ -50,7 +52,6 @@ class FrontendNode {
   runtime::IgnisConfig config_;
   std::string config_hash_;
   runtime::LcmLink link_;
-  runtime::ReceiverCounts* imu_counts_ = nullptr;
   runtime::ReceiverCounts* scan_counts_ = nullptr;
   runtime::ReceiverCounts* request_counts_ = nullptr;
   runtime::ReceiverCounts* cloud_request_counts_ = nullptr;
@@ -65,6 +66,7 @@ class FrontendNode {
   RateLimit resends_{100.0, 100.0};      // keyframes a second; back end and map together ask for at most 85
   RateLimit cloud_resends_{50.0, 50.0};  // answers a second; one map asks for 24 messages at a time
   Utime newest_utime_ = 0;
+  std::chrono::steady_clock::time_point imu_heard_ = std::chrono::steady_clock::now();
   StateOrder order_;
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;

@@ -75,6 +75,7 @@ ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
 
 void Lio::start(const FilterState& first) {
   filter_ = first;
+  sound_ = first;
   has_set_off_ = config_.start != "at_rest";
   if (config_.start == "at_rest" && config_.use_scan_matching) ask_scans_or_wait();
   start_motion_ = StartMotion(config_);  // its memory is needed no more

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/eskf.h"
 
+#include <Eigen/Cholesky>
+
 #include "common/so3.h"
 #include "frontend/error_step.h"
 
@@ -140,6 +142,10 @@ Eigen::Matrix3d rest_acceleration_covariance(const FilterState& filter, double g
 bool make_symmetric(ErrorCovariance& covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
   return covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0;
+}
+
+bool is_covariance(const ErrorCovariance& matrix) {
+  return matrix.allFinite() && Eigen::LLT<ErrorCovariance>(matrix).info() == Eigen::Success;
 }
 
 }  // namespace ignis

@@ -38,7 +38,7 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   opinion_.note_scan({filter_.nominal, cautious_}, filter_.nominal.v_odom - predicted.nominal.v_odom, match.facing);
   const std::optional<Contradiction> contradiction = opinion_.contradiction();
   if (!contradiction || imu_.samples().front().utime > contradiction->since.nominal.utime) return;
-  FilterState alone = dead_reckoned(contradiction->since);
+  FilterState alone = dead_reckoned(contradiction->since, filter_.nominal.utime);
   // The way that was not seen would be a step of the published pose: it becomes uncertainty. Along all else scans have
   // held the pose, and two seconds of dead reckoning are off by more than they find back from.
   const Eigen::Vector3d& d = contradiction->direction;

@@ -14,7 +14,7 @@ constexpr double kCoastingPeriods = 400.0;  // as uncertain as a gap of this len
 
 }  // namespace
 
-std::string_view text(ImuFault fault) {
+const char* text(ImuFault fault) {
   switch (fault) {
     case ImuFault::kNone:
       return "accepted";

@@ -17,7 +17,7 @@ namespace ignis {
 /// Why an IMU sample was not taken.
 enum class ImuFault : std::int8_t { kNone, kNotFinite, kImplausible, kDuplicate, kLate, kLeap };
 
-[[nodiscard]] std::string_view text(ImuFault fault);
+[[nodiscard]] const char* text(ImuFault fault);
 
 /// How often each thing happened since the last reset.
 struct ImuCounters {

@@ -214,6 +214,7 @@ ScanResult Lio::process(const Scan& scan) {
   if (scan.end_utime() < filter_.nominal.utime) {
     return refuse(scan, applied_scans_ == 0 ? ScanReason::kNotInitialised : ScanReason::kBadStamp);
   }
+  mend_filter();
   if (gathers_first_scans(scan)) return refuse(scan, ScanReason::kNotInitialised);
   follow_to(scan.end_utime());
   const ScanSelection& selection = selector_.select(scan);
@@ -300,7 +301,7 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& matc
   const ScanReason reason = match.stats.reason;
   if (reason == ScanReason::kTooFewPoints) return;
   contradictions_ = is_contradiction(reason) ? contradictions_ + 1 : 0;
-  if (contradictions_ >= config_.reanchor_scans) begin_new_map();
+  if (contradictions_ >= config_.reanchor_scans) begin_new_map("scans contradicted the map, a new one was begun");
   const bool confirmed = contradictions_ == 0 || map_.empty() || !config_.quarantine;
   if (map_.empty() || match.stats.applied()) {
     const double share = map_.empty() ? 1.0 : 1.0 / std::max(match.map_age_scans, 1.0);
@@ -310,16 +311,35 @@ void Lio::grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& matc
   map_.slide(filter_.nominal.T_odom_body.translation, sure_since(config_.map_memory_sigma_m));
 }
 
+/// Of a filter that is none any more nothing is used: from where it was sound the IMU leads on, and since nobody knows
+/// what it did to the map, a new session begins.
+void Lio::mend_filter() {
+  if (is_sound()) {
+    sound_ = filter_;
+    return;
+  }
+  const Utime now = filter_.nominal.utime;
+  sound_.nominal.utime = std::max(sound_.nominal.utime, imu_.samples().front().utime);
+  filter_ = dead_reckoned(sound_, now);
+  cautious_ = filter_.covariance;
+  matcher_ = ScanMatcher(config_);
+  drift_ = MapDrift(config_.map_drift);
+  drift_.begin(filter_);
+  mapped_velocity_variance_ = velocity_variance(filter_.covariance);
+  unaided_.reset();
+  begin_new_map("the filter was no longer sound, a new session was begun");
+}
+
 /// Whatever the old map was, this is another place or the pose was wrong: a new session begins here. Attitude to
 /// gravity, biases and velocity carry over with what is known of them.
-void Lio::begin_new_map() {
+void Lio::begin_new_map(const char* reason) {
   map_.clear();
   contradictions_ = 0;
   last_correction_ = filter_.nominal.utime;
   ++session_;
   session_end_.reset();
   keyframer_ = Keyframer(config_, session_);
-  trust_.note_loss();
+  trust_.note_loss(reason);
   opinion_.forget();
 }
 

@@ -113,9 +113,10 @@ class Lio {
   void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void follow_moving_start(ScanReason reason);
   void heed_second_opinion(const FilterState& predicted, const MatchResult& match);
-  [[nodiscard]] FilterState dead_reckoned(FilterState from) const;
+  [[nodiscard]] FilterState dead_reckoned(FilterState from, Utime until) const;
   void note_evidence(const FilterState& predicted, ScanStats stats, const Scan& scan);
-  void begin_new_map();
+  void begin_new_map(const char* reason);
+  void mend_filter();
   void coast_to(Utime utime);
   /// Whether the vehicle stands at the committed instant.
   bool use_standstill();
@@ -178,6 +179,7 @@ class Lio {
   /// Covariance of the same state when nothing is believed about directions that scans hardly observe. The filter's own
   /// uses what little they say to correct the state; this one is published and judged by.
   ErrorCovariance cautious_ = ErrorCovariance::Identity();
+  FilterState sound_;  ///< the committed one when it was last looked at and sound
   NavState live_;
   bool velocity_known_ = false;
   double mapped_velocity_variance_ = 0.0;  ///< [m^2/s^2] with which the points of the map were deskewed, in the mean

@@ -62,9 +62,9 @@ void Lio::commit_to(Utime utime) {
   if (utime - filter_.nominal.utime >= kCommitStepUs) follow_to(utime);
 }
 
-/// The state of the committed instant without anything but the IMU since then.
-FilterState Lio::dead_reckoned(FilterState from) const {
-  for_each_step(imu_.samples(), from.nominal.utime, filter_.nominal.utime,
+/// The state at an instant without anything but the IMU since then.
+FilterState Lio::dead_reckoned(FilterState from, Utime until) const {
+  for_each_step(imu_.samples(), from.nominal.utime, until,
                 [&](std::size_t next, const InertialInput& input, double dt) {
                   predict(from, input, dt, config_, noise_scale(next));
                 });

@@ -21,6 +21,7 @@ constexpr double kLongestSilence = 3.0;          // s: the longest that is bridg
 void Lio::resume() {
   resumed_from_ = imu_.newest();
   unaided_ = filter_;
+  sound_ = filter_;
   last_correction_.reset();
   trust_.note_resumption();
   start_note_ = std::format("going on with session {}", session_);
@@ -62,10 +63,8 @@ bool Lio::can_be_resumed() const {
 }
 
 bool Lio::is_sound() const {
-  ErrorCovariance covariance = filter_.covariance;
-  ErrorCovariance cautious = cautious_;
   const NavState& state = filter_.nominal;
-  return running_ && !imu_.empty() && make_symmetric(covariance) && make_symmetric(cautious) &&
+  return running_ && !imu_.empty() && is_covariance(filter_.covariance) && is_covariance(cautious_) &&
          state.T_odom_body.all_finite() && state.v_odom.allFinite() && state.gyro_bias.allFinite() &&
          state.accel_bias.allFinite() && state.angular_rate.allFinite() && state.gravity_tilt.allFinite();
 }
@@ -102,7 +101,7 @@ void Lio::give_up_resumption() {
   filter_ = *unaided_;
   cautious_ = unaided_->covariance;
   unaided_.reset();
-  begin_new_map();
+  begin_new_map("scans did not confirm the pose after a gap, a new map was begun");
   start_note_ = "new session: scans did not confirm the pose after a gap";
 }
 

@@ -9,13 +9,14 @@
 namespace ignis {
 namespace {
 
-constexpr int kScansUntilDegraded = 5;     // without a correction
-constexpr double kSecondsUntilLost = 2.0;  // without a correction
-constexpr double kSilentImuSeconds = 0.1;  // of scan time
-constexpr int kScansToConfirm = 10;        // applied ones, after silence or a loss
-constexpr double kOpinionSeconds = 2.0;    // over which scans and IMU are compared
-constexpr double kMaxDisagreement = 8.0;   // sigma
-constexpr double kStep = 1.0;              // m, in which the way driven is counted
+constexpr int kScansUntilDegraded = 5;      // without a correction
+constexpr double kSecondsUntilLost = 2.0;   // without a correction
+constexpr double kSilentImuSeconds = 0.1;   // of scan time
+constexpr double kSilentScanSeconds = 0.5;  // of inertial time: five scans of a spinning LiDAR
+constexpr int kScansToConfirm = 10;         // applied ones, after silence or a loss
+constexpr double kOpinionSeconds = 2.0;     // over which scans and IMU are compared
+constexpr double kMaxDisagreement = 8.0;    // sigma
+constexpr double kStep = 1.0;               // m, in which the way driven is counted
 // Of the way driven: what the position's sigma may grow by. In 2 km of a warehouse, where each metre was observed, it
 // reached 0.29 m; along a corridor it is metres after 40 m.
 constexpr double kUsualDrift = 1e-4;
@@ -28,7 +29,11 @@ void TrustMonitor::note_imu(Utime utime) {
 }
 
 void TrustMonitor::note_arrival(Utime scan_end) {
+  const bool came_too_late = is_out_of_sight();
   newest_scan_ = newest_scan_ ? std::max(*newest_scan_, scan_end) : scan_end;
+  if (!came_too_late && !is_out_of_sight()) return;
+  unseen_ = true;
+  scans_to_confirm_ = kScansToConfirm;
 }
 
 void TrustMonitor::note_scan(const ScanEvidence& evidence) {
@@ -49,15 +54,11 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
     ++scans_since_applied_;
     return;
   }
-  if (is_out_of_sight()) {
-    unseen_ = true;
-    scans_to_confirm_ = kScansToConfirm;
-  }
   last_applied_ = stats.utime;
   scans_since_applied_ = 0;
   scans_to_confirm_ = std::max(scans_to_confirm_ - 1, 0);
   if (scans_to_confirm_ > 0) return;
-  lost_ = false;
+  lost_.clear();
   unseen_ = false;
   // What closed the gap says nothing about how scans and IMU agree.
   if (resumed_) corrections_.clear();
@@ -78,6 +79,7 @@ void TrustMonitor::forget_uncertain_start() {
 
 void TrustMonitor::note_resumption() {
   resumed_ = true;
+  newest_scan_.reset();  // the gap is known: how long no scan has come counts from the next one on
   scans_to_confirm_ = kScansToConfirm;
   corrections_.clear();
 }
@@ -88,8 +90,8 @@ void TrustMonitor::note_contradiction() {
   corrections_.clear();
 }
 
-void TrustMonitor::note_loss() {
-  lost_ = true;
+void TrustMonitor::note_loss(std::string reason) {
+  lost_ = std::move(reason);
   resumed_ = false;
   ++losses_;
   scans_to_confirm_ = kScansToConfirm;
@@ -110,12 +112,18 @@ double TrustMonitor::seconds_without_imu() const {
   return newest_imu_ && newest_scan_ ? seconds_between(*newest_imu_, *newest_scan_) : 0.0;
 }
 
+double TrustMonitor::seconds_since_arrival() const {
+  return newest_imu_ && newest_scan_ ? seconds_between(*newest_scan_, *newest_imu_) : 0.0;
+}
+
 double TrustMonitor::seconds_without_scan() const {
-  return last_applied_ && newest_scan_ ? seconds_between(*last_applied_, *newest_scan_) : 0.0;
+  if (!last_applied_ || !newest_scan_) return 0.0;
+  return seconds_between(*last_applied_, *newest_scan_) + std::max(seconds_since_arrival(), 0.0);
 }
 
 bool TrustMonitor::is_out_of_sight() const {
-  return scans_since_applied_ >= kScansUntilDegraded && seconds_without_scan() > kSecondsUntilLost;
+  const bool none_fits = scans_since_applied_ >= kScansUntilDegraded || seconds_since_arrival() > kSilentScanSeconds;
+  return none_fits && seconds_without_scan() > kSecondsUntilLost;
 }
 
 double TrustMonitor::disagreement() const {
@@ -131,19 +139,21 @@ double TrustMonitor::disagreement() const {
 }
 
 Trust TrustMonitor::trust() const {
-  if (lost_ || unseen_ || position_sigma_ > config_.lost_sigma_m || is_out_of_sight()) return Trust::kLost;
+  if (!lost_.empty() || unseen_ || position_sigma_ > config_.lost_sigma_m || is_out_of_sight()) return Trust::kLost;
   if (scans_since_applied_ >= kScansUntilDegraded || position_sigma_ > config_.degraded_sigma_m ||
-      sigma_since_start_ > usual_sigma() || seconds_without_imu() > kSilentImuSeconds || scans_to_confirm_ > 0 ||
-      disagreement() > kMaxDisagreement || restless_) {
+      sigma_since_start_ > usual_sigma() || seconds_without_imu() > kSilentImuSeconds ||
+      seconds_since_arrival() > kSilentScanSeconds || scans_to_confirm_ > 0 || disagreement() > kMaxDisagreement ||
+      restless_) {
     return Trust::kDegraded;
   }
   return Trust::kOk;
 }
 
 std::string TrustMonitor::reason() const {
-  if (lost_)
-    return std::format("lost: scans contradicted the map, a new one was begun ({} applied scans to go)",
-                       scans_to_confirm_);
+  if (!lost_.empty()) return std::format("lost: {} ({} applied scans to go)", lost_, scans_to_confirm_);
+  if (seconds_since_arrival() > kSilentScanSeconds) {
+    return std::format("no scan for {:.1f} s, going on with the IMU alone", seconds_since_arrival());
+  }
   if (position_sigma_ > config_.degraded_sigma_m) {
     return std::format("position sigma {:.2f} m (limit {:.2f}): a direction is not observed", position_sigma_,
                        config_.degraded_sigma_m);

@@ -46,12 +46,13 @@ class TrustMonitor {
 
   /// A real IMU sample arrived.
   void note_imu(Utime utime);
-  /// A scan arrived, used or not: time goes on.
+  /// A scan arrived, used or not.
   void note_arrival(Utime scan_end);
   /// A scan was processed.
   void note_scan(const ScanEvidence& evidence);
-  /// The local map was given up; from here on the pose says nothing about where the vehicle was before.
-  void note_loss();
+  /// The local map was given up; from here on the pose says nothing about where the vehicle was before. `reason` is for
+  /// people.
+  void note_loss(std::string reason);
   /// The filter goes on from a checkpoint. Until scans have confirmed it, the pose is dead reckoning over a gap.
   void note_resumption();
   [[nodiscard]] bool awaits_confirmation() const { return resumed_; }
@@ -76,6 +77,8 @@ class TrustMonitor {
   };
 
   [[nodiscard]] double seconds_without_imu() const;
+  /// [s] of inertial samples since the newest scan, used or not.
+  [[nodiscard]] double seconds_since_arrival() const;
   [[nodiscard]] double seconds_without_scan() const;
   [[nodiscard]] bool is_out_of_sight() const;
   void follow(const Eigen::Vector3d& position);
@@ -87,8 +90,8 @@ class TrustMonitor {
   std::optional<Utime> last_applied_;
   std::string last_reason_;
   int scans_since_applied_ = 0;
-  int scans_to_confirm_ = 0;  ///< that have to be applied before the trust comes back
-  bool lost_ = false;
+  int scans_to_confirm_ = 0;     ///< that have to be applied before the trust comes back
+  std::string lost_;             ///< why the map was given up; empty when it was not, or the place is found
   bool unseen_ = false;          ///< no scan has fitted for so long that one alone does not prove the place
   bool resumed_ = false;         ///< from a checkpoint, and not yet confirmed
   std::string uncertain_start_;  ///< why; empty when it is none
@@ -114,7 +117,7 @@ class TrustMonitor {
     io.text(monitor.last_reason_);
     io.number(monitor.scans_since_applied_);
     io.number(monitor.scans_to_confirm_);
-    io.number(monitor.lost_);
+    io.text(monitor.lost_);
     io.number(monitor.unseen_);
     io.text(monitor.uncertain_start_);
     io.number(monitor.contradicted_);

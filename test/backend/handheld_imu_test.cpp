@@ -7,6 +7,7 @@
 
 #include "backend/preintegration.h"
 #include "backend/recorded_data.h"
+#include "backend/smoother.h"
 #include "common/frames.h"
 #include "common/trajectory_file.h"
 
@@ -72,6 +73,8 @@ class HandheldImu : public ::testing::Test {
     return state;
   }
 
+  [[nodiscard]] NavState smoothed_with(const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias) const;
+
   std::vector<ImuSample> samples_;
   Trajectory poses_;
 };
@@ -103,6 +106,46 @@ TEST_F(HandheldImu, DeadReckonsASecondWithinTheSigmaThatItPredicts) {
   EXPECT_LT(position / windows, 0.02);
   EXPECT_LT(rotation / windows * 57.29578, 0.1);
   EXPECT_GE(inside, windows * 97 / 100);
+}
+
+/// Biases of the newest of ninety keyframes, a second apart, when so much is added to the samples.
+NavState HandheldImu::smoothed_with(const Eigen::Vector3d& gyro_bias, const Eigen::Vector3d& accel_bias) const {
+  BackendConfig config;
+  config.use_loop_closing = false;
+  Smoother smoother(config, LoopGates());
+  SmootherUpdate update;
+  for (int id = 0; id < 90; ++id) {
+    Keyframe keyframe;
+    keyframe.id = id;
+    keyframe.state = state_at(1 + kWindow * static_cast<std::size_t>(id));
+    keyframe.previous_utime = id == 0 ? keyframe.state.utime : update.newest.utime;
+    keyframe.covariance *= 1e-4;
+    keyframe.scan_information.diagonal() << Eigen::Vector3d::Constant(1.0 / (0.002 * 0.002)),
+        Eigen::Vector3d::Constant(1.0 / (0.01 * 0.01));
+    keyframe.imu = between(keyframe.previous_utime, keyframe.state.utime);
+    for (ImuSample& sample : keyframe.imu) {
+      sample.gyro += gyro_bias;
+      sample.accel += accel_bias;
+    }
+    update = smoother.add_keyframe(keyframe);
+    EXPECT_TRUE(update.accepted()) << update.reason;
+  }
+  return update.newest;
+}
+
+TEST_F(HandheldImu, TheBiasesThatWereAddedToItAreFound) {
+  const Eigen::Vector3d gyro_bias(0.01, -0.006, 0.008);
+  const Eigen::Vector3d accel_bias(0.1, -0.08, 0.06);
+  const NavState as_it_is = smoothed_with(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  const NavState biased = smoothed_with(gyro_bias, accel_bias);
+  const Eigen::Vector3d gyro_error = biased.gyro_bias - as_it_is.gyro_bias - gyro_bias;
+  const Eigen::Vector3d accel_error = biased.accel_bias - as_it_is.accel_bias - accel_bias;
+  std::printf("own biases %.5f rad/s, %.4f m/s^2; of what was added %.6f rad/s, %.5f m/s^2 are missing\n",
+              as_it_is.gyro_bias.norm(), as_it_is.accel_bias.norm(), gyro_error.norm(), accel_error.norm());
+  EXPECT_LT(as_it_is.gyro_bias.norm(), 0.002) << "the recording has hardly any";
+  EXPECT_LT(as_it_is.accel_bias.norm(), 0.05);
+  EXPECT_LT(gyro_error.norm(), 1e-4);
+  EXPECT_LT(accel_error.norm(), 0.01);
 }
 
 TEST_F(HandheldImu, SeesGravityDownward) {

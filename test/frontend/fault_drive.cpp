@@ -14,7 +14,8 @@ std::vector<ImuSample>::iterator sample_at(Drive& input, double seconds) {
   return std::ranges::lower_bound(input.imu, input.imu.front().utime + to_micros(seconds), {}, &ImuSample::utime);
 }
 
-Watched::Watched(const Drive& input, const FrontendConfig& config, const std::function<void(Lio&)>& before)
+Watched::Watched(const Drive& input, const FrontendConfig& config, const std::function<void(Lio&)>& before,
+                 const std::function<void(Lio&, std::size_t)>& before_scan)
     : lio(config) {
   before(lio);
   // Corrupt stamps must not decide what arrives when: nothing arrives more than a tenth of a second after the last.
@@ -25,6 +26,7 @@ Watched::Watched(const Drive& input, const FrontendConfig& config, const std::fu
     while (imu != input.imu.end() && (imu->utime <= now || imu->utime > now + 60 * kMicrosPerSecond)) {
       take(lio.add_imu(*imu++).scans);
     }
+    before_scan(lio, trust.size());
     take(lio.add_scan(scan));
     trust.emplace_back(scan.end_utime(), lio.status().trust);
   }

@@ -24,7 +24,8 @@ struct Watched {
 
   explicit Watched(
       const Drive& input, const FrontendConfig& config = tuned_config(),
-      const std::function<void(Lio&)>& before = [](Lio&) {});
+      const std::function<void(Lio&)>& before = [](Lio&) {},
+      const std::function<void(Lio&, std::size_t scan)>& before_scan = [](Lio&, std::size_t) {});
 
   /// Seconds are those of drive().
   [[nodiscard]] Trust trust_at(double seconds) const;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <vector>
 
 #include "frontend/lio_runner.h"
@@ -60,6 +61,27 @@ TEST(LioCorridor, AnEndInSightHoldsTheAxis) {
     EXPECT_LT(along.error, 0.08) << "seed " << seed;
     EXPECT_LT(along.sigma, 0.05) << "seed " << seed;
     EXPECT_LT(along.share_named, 0.05) << "seed " << seed;
+  }
+}
+
+TEST(LioCorridor, TheDirectionThatIsNamedIsItsAxis) {
+  for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+    const LioRun run = test::run_lio(test::tuned_config(), drive_in(test::bare_corridor(), seed));
+    int named = 0;
+    double across = 0.0;
+    for (const ScanResult& scan : run.scans) {
+      if (!scan.stats.applied() || scan.stats.unobserved.empty()) continue;
+      ++named;
+      Eigen::Vector3d axis;
+      ASSERT_EQ(std::sscanf(scan.stats.unobserved.c_str(), "position along odom (%lf, %lf, %lf)", &axis.x(), &axis.y(),
+                            &axis.z()),
+                3)
+          << scan.stats.unobserved;
+      across += axis.head<2>().norm();
+      EXPECT_LT(axis.head<2>().norm(), 0.07) << "four degrees; seed " << seed << ": " << scan.stats.unobserved;
+    }
+    EXPECT_GT(named, 150) << "of some 190";
+    EXPECT_LT(across / named, 0.0262) << "a degree and a half in the mean; seed " << seed;
   }
 }
 

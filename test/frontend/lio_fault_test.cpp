@@ -344,26 +344,5 @@ TEST(Fault_F9, StampsOfTheFarFutureBeforeAllOthersLeaveTheResultBitIdentical) {
   EXPECT_EQ(run.scans.back().covariance, undisturbed.scans.back().covariance);
 }
 
-TEST(Fault_F11, BeingCarriedElsewhereIsALossANewSessionAndAFind) {
-  // From one scan on all ranges are 6 % too long: nothing fits the old map, but the new scans fit one another.
-  Drive input = drive();
-  for (std::size_t i = 160; i < input.scans.size(); ++i) {
-    for (ScanPoint& point : input.scans[i].points) point.position *= 1.06F;
-  }
-  for (const FrontendConfig& config : {FrontendConfig{}, test::tuned_config()}) {
-    const Watched run(input, config);
-    const auto lost = std::ranges::find(run.trust, Trust::kLost, [](const auto& each) { return each.second; });
-    ASSERT_NE(lost, run.trust.end());
-    EXPECT_LE(lost - run.trust.begin(), 160 + 21) << "within a second";
-    EXPECT_EQ(run.trust.back().second, Trust::kOk);
-    EXPECT_NE(run.lio.status().reason.find("found again"), std::string::npos);
-    EXPECT_GE(run.lio.session(), 1);
-    const auto keyframe =
-        std::ranges::find_if(run.scans, [](const ScanResult& r) { return r.keyframe && r.keyframe->session > 0; });
-    ASSERT_NE(keyframe, run.scans.end());
-    EXPECT_EQ(keyframe->keyframe->id, 0) << "keyframes of the new session begin anew";
-  }
-}
-
 }  // namespace
 }  // namespace ignis

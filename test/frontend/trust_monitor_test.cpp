@@ -29,6 +29,10 @@ class Feed {
     }
   }
 
+  void run_without_scans(double seconds) {
+    for (const Utime end = now_ + to_micros(seconds); now_ < end;) monitor.note_imu(now_ += 4'000);
+  }
+
  private:
   Utime now_ = 1'000'000'000;
 };
@@ -72,6 +76,32 @@ TEST(TrustMonitor, ScansThatFitAgainAfterALossFindThePlaceOnlyOnceTenOfThemAgree
   expect(feed.monitor, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
   feed.run(1);
   expect(feed.monitor, Trust::kOk, "OK");
+}
+
+TEST(TrustMonitor, ScansThatComeNoMoreDegradeAndTwoSecondsWithoutThemLose) {
+  Feed feed;
+  feed.run_without_scans(0.4);
+  expect(feed.monitor, Trust::kOk, "OK");
+  feed.run_without_scans(0.2);
+  expect(feed.monitor, Trust::kDegraded, "no scan for 0.6 s, going on with the IMU alone");
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "OK");
+  feed.run_without_scans(2.1);
+  expect(feed.monitor, Trust::kLost, "no scan for 2.1 s");
+  feed.run(9);
+  expect(feed.monitor, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "OK");
+}
+
+TEST(TrustMonitor, ARefusedScanNowAndThenDoesNotHideThatNoneFits) {
+  Feed feed;
+  feed.evidence.stats.reason = ScanReason::kTooFewMatches;
+  for (int i = 0; i < 2; ++i) {
+    feed.run_without_scans(1.0);
+    feed.run(1);
+  }
+  EXPECT_EQ(feed.monitor.trust(), Trust::kLost) << feed.monitor.reason();
 }
 
 TEST(TrustMonitor, APoseThatIsNotKnownIsNotOk) {
@@ -137,7 +167,7 @@ TEST(TrustMonitor, ASilentImuDegradesWithin100MsAndIsForgivenTenScansAfterItsRet
 
 TEST(TrustMonitor, ALossIsAnnouncedAndSoIsBeingFoundAgain) {
   Feed feed;
-  feed.monitor.note_loss();
+  feed.monitor.note_loss("scans contradicted the map, a new one was begun");
   feed.run(9);
   expect(feed.monitor, Trust::kLost, "a new one was begun");
   feed.run(1);
