@@ -44,7 +44,7 @@ class L1Decoder {
 
   [[nodiscard]] DecoderCounters counters() const;
   [[nodiscard]] const Housekeeping& housekeeping() const { return stream_.housekeeping(); }
-  [[nodiscard]] const SensorHealth& health() const { return stream_.health(); }
+  [[nodiscard]] SensorHealth health() const { return stream_.health(); }
   [[nodiscard]] const SensorClock& clock() const { return clock_; }
   /// [us] stamp of the newest event; 0 before the first one.
   [[nodiscard]] Utime newest_utime() const { return newest_utime_; }

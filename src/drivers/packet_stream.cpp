@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/packet_stream.h"
 
+#include <algorithm>
 #include <cmath>
 #include <format>
 #include <utility>
@@ -59,6 +60,14 @@ StreamCounters PacketStream::counters() const {
   return counters;
 }
 
+SensorHealth PacketStream::health() const {
+  const Rejections worst =
+      std::ranges::max({auxiliaries_rejected_, distances_rejected_, samples_rejected_}, {}, &Rejections::in_a_row);
+  return {.rejected_in_a_row = worst.in_a_row,
+          .rejected_field = std::string(worst.field),
+          .equal_imu_samples = equal_imu_samples_};
+}
+
 void PacketStream::handle(const Frame& frame) {
   pairer_.on_frame();
   switch (frame.id) {
@@ -83,7 +92,7 @@ void PacketStream::handle(const Frame& frame) {
 }
 
 void PacketStream::handle(const Auxiliary& message, double sent_before) {
-  if (!accept(fault_in(message, config_))) return;
+  if (!accept(fault_in(message, config_), auxiliaries_rejected_)) return;
   housekeeping_.apd_temperature = message.apd_temperature;
   housekeeping_.imu_temperature = message.imu_temperature;
   housekeeping_.dirty_index = message.dirty_index;
@@ -97,7 +106,7 @@ void PacketStream::handle(const Auxiliary& message, double sent_before) {
 }
 
 void PacketStream::handle(const Distance& message, double sent_before) {
-  if (!accept(fault_in(message, config_))) return;
+  if (!accept(fault_in(message, config_), distances_rejected_)) return;
   auto pair = pairer_.on_distance(message, sent_before);
   if (!pair) return;
   const std::int64_t count = scans_.unwrapper.count();
@@ -111,7 +120,7 @@ void PacketStream::handle(const Distance& message, double sent_before) {
 }
 
 void PacketStream::handle(const ImuAttitude& message, double sent_before) {
-  if (!accept(fault_in(message, config_))) return;
+  if (!accept(fault_in(message, config_), samples_rejected_)) return;
   const bool first = !samples_.unwrapper.last_id();
   const std::int64_t step = advance(samples_, scans_, message.packet_id, sent_before);
   if (step == 0 && !first) {
@@ -123,20 +132,19 @@ void PacketStream::handle(const ImuAttitude& message, double sent_before) {
   packets_.emplace_back(CountedImu{samples_.unwrapper.count(), sent_before, message});
 }
 
-bool PacketStream::accept(std::string_view fault) {
+bool PacketStream::accept(std::string_view fault, Rejections& rejections) {
   if (fault.empty()) {
-    health_.rejected_in_a_row = 0;
+    rejections = {};
     return true;
   }
   ++counters_.rejected_values;
-  ++health_.rejected_in_a_row;
-  health_.rejected_field = fault;
+  rejections = {rejections.in_a_row + 1, fault};
   return false;
 }
 
 void PacketStream::note_values(const ImuAttitude& message) {
   const bool equal = last_imu_ && last_imu_->gyro == message.gyro && last_imu_->accel == message.accel;
-  health_.equal_imu_samples = equal ? health_.equal_imu_samples + 1 : 0;
+  equal_imu_samples_ = equal ? equal_imu_samples_ + 1 : 0;
   last_imu_ = message;
 }
 

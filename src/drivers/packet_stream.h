@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -65,8 +66,8 @@ struct Housekeeping {
 
 /// Signs of a sick sensor behind valid frames.
 struct SensorHealth {
-  int rejected_in_a_row = 0;   ///< frames with absurd content since the last good one
-  std::string rejected_field;  ///< the field that was refused last
+  int rejected_in_a_row = 0;   ///< frames with absurd content since the last good one of their type; the worst type
+  std::string rejected_field;  ///< the field of it that was refused last
   int equal_imu_samples = 0;   ///< inertial samples in a row with identical values
 };
 
@@ -83,7 +84,7 @@ class PacketStream {
 
   [[nodiscard]] StreamCounters counters() const;
   [[nodiscard]] const Housekeeping& housekeeping() const { return housekeeping_; }
-  [[nodiscard]] const SensorHealth& health() const { return health_; }
+  [[nodiscard]] SensorHealth health() const;
 
  private:
   /// One of the two running counters of the wire.
@@ -95,12 +96,19 @@ class PacketStream {
     std::int64_t count_of_other = 0;  ///< where the other counter stood then
   };
 
+  /// Frames of one message type with absurd content, since its last good one: good scans say nothing about a sick
+  /// inertial unit.
+  struct Rejections {
+    int in_a_row = 0;
+    std::string_view field;
+  };
+
   [[nodiscard]] std::vector<Packet> drain();
   void handle(const Frame& frame);
   void handle(const Auxiliary& message, double sent_before);
   void handle(const Distance& message, double sent_before);
   void handle(const ImuAttitude& message, double sent_before);
-  [[nodiscard]] bool accept(std::string_view fault);
+  [[nodiscard]] bool accept(std::string_view fault, Rejections& rejections);
   void note_values(const ImuAttitude& message);
   void note_sensor_time(const Auxiliary& message, std::int64_t packets_since);
   void restart();
@@ -117,7 +125,10 @@ class PacketStream {
   std::vector<Packet> packets_;
   StreamCounters counters_;
   Housekeeping housekeeping_;
-  SensorHealth health_;
+  Rejections auxiliaries_rejected_;
+  Rejections distances_rejected_;
+  Rejections samples_rejected_;
+  int equal_imu_samples_ = 0;
 };
 
 }  // namespace ignis::l1

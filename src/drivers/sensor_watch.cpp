@@ -30,6 +30,7 @@ SensorReport SensorWatch::look(Utime now, bool connected, const DecoderCounters&
   bytes_.update(counters.framing.bytes, now);
   imu_.update(counters.imu_published, now);
   packets_.update(counters.pairing.paired, now);
+  rejections_.update(counters.rejected_values, now);
   SensorReport report = judge(now, connected, health);
   if (report.severity != Severity::kOk) {
     trouble_at_ = now;
@@ -43,7 +44,8 @@ SensorReport SensorWatch::look(Utime now, bool connected, const DecoderCounters&
 
 SensorReport SensorWatch::judge(Utime now, bool connected, const SensorHealth& health) const {
   if (!connected) return {SensorState::kDisconnected, Severity::kFault, std::format("{} is gone, trying again", link_)};
-  if (health.rejected_in_a_row >= kRejectedIsFault) {
+  // What no longer comes is no longer wrong: it is missing.
+  if (health.rejected_in_a_row >= kRejectedIsFault && !rejections_.quiet_for(now, kStreamMissingUs)) {
     return {SensorState::kRunning, Severity::kFault,
             std::format("{} frames in a row with impossible {}", health.rejected_in_a_row, health.rejected_field)};
   }

@@ -52,6 +52,7 @@ class SensorWatch {
   Activity bytes_;
   Activity imu_;
   Activity packets_;
+  Activity rejections_;
   Utime connected_at_ = 0;
   bool was_connected_ = false;
   Utime trouble_at_ = 0;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/l1_samples.h"
+#include "drivers/sensor_watch.h"
 
 namespace ignis::l1 {
 namespace {
@@ -166,6 +167,28 @@ TEST(L1Decoder, RejectsAbsurdContentAndSaysWhere) {
   EXPECT_EQ(decoder.counters().rejected_values, 60);
   EXPECT_EQ(decoder.health().rejected_in_a_row, 60);
   EXPECT_EQ(decoder.health().rejected_field, "linear_acceleration");
+}
+
+TEST(Fault_D2, AbsurdValuesOfOneMessageAreAFaultAmongGoodOnesOfTheOthers) {
+  for (const bool is_imu_bad : {true, false}) {
+    L1Decoder decoder(capture_config(), plain_mount());
+    SensorWatch watch("a port");
+    SensorReport report;
+    for (std::uint16_t id = 1; id <= 60; ++id) {
+      ImuAttitude sample = samples::imu(id);
+      Auxiliary angles = samples::auxiliary(id);
+      (is_imu_bad ? sample.accel[0] : angles.theta_rad) = 1e28F;
+      Bytes stream = samples::frame(kImuId, sample);
+      append(stream, samples::frame(kAuxiliaryId, angles));
+      append(stream, samples::frame(kDistanceId, samples::distance(id)));
+      (void)decoder.feed(stream, 0);
+      report = watch.look(1'000'000 + 4'000 * id, true, decoder.counters(), decoder.health());
+      EXPECT_EQ(report.severity == Severity::kFault, id >= 50) << id << ": " << report.text;
+    }
+    EXPECT_EQ(decoder.counters().rejected_values, 60);
+    const std::string field = is_imu_bad ? "linear_acceleration" : "theta_angle";
+    EXPECT_EQ(report.text, "60 frames in a row with impossible " + field);
+  }
 }
 
 TEST(L1Decoder, CountsMessagesItDoesNotDecodeAndRepeats) {

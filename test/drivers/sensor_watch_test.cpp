@@ -86,10 +86,19 @@ TEST_F(SensorWatchTest, ReportsFrozenAndImpossibleValues) {
   (void)run(2.0, true, true);
   EXPECT_EQ(run(0.05, true, true, {.rejected_in_a_row = 0, .rejected_field = "", .equal_imu_samples = 25}).text,
             "inertial values are frozen");
+  counters_.rejected_values += 50;
   const SensorReport report =
       run(0.05, true, true, {.rejected_in_a_row = 50, .rejected_field = "theta_angle", .equal_imu_samples = 0});
   EXPECT_EQ(report.severity, Severity::kFault);
   EXPECT_NE(report.text.find("theta_angle"), std::string::npos);
+}
+
+TEST_F(SensorWatchTest, ForgetsImpossibleValuesOfAMessageThatNoLongerComes) {
+  (void)run(2.0, true, true);
+  const SensorHealth health{.rejected_in_a_row = 60, .rejected_field = "theta_angle"};
+  counters_.rejected_values += 60;
+  EXPECT_EQ(run(0.05, true, false, health).severity, Severity::kFault);
+  EXPECT_EQ(run(1.5, true, false, health).state, SensorState::kStandby);
 }
 
 TEST_F(SensorWatchTest, TellsAClosedPortFromASilentOne) {
