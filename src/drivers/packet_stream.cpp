@@ -65,7 +65,8 @@ SensorHealth PacketStream::health() const {
       std::ranges::max({auxiliaries_rejected_, distances_rejected_, samples_rejected_}, {}, &Rejections::in_a_row);
   return {.rejected_in_a_row = worst.in_a_row,
           .rejected_field = std::string(worst.field),
-          .equal_imu_samples = equal_imu_samples_};
+          .equal_gyro_samples = equal_gyro_samples_,
+          .equal_accel_samples = equal_accel_samples_};
 }
 
 void PacketStream::handle(const Frame& frame) {
@@ -143,8 +144,8 @@ bool PacketStream::accept(std::string_view fault, Rejections& rejections) {
 }
 
 void PacketStream::note_values(const ImuAttitude& message) {
-  const bool equal = last_imu_ && last_imu_->gyro == message.gyro && last_imu_->accel == message.accel;
-  equal_imu_samples_ = equal ? equal_imu_samples_ + 1 : 0;
+  equal_gyro_samples_ = last_imu_ && last_imu_->gyro == message.gyro ? equal_gyro_samples_ + 1 : 0;
+  equal_accel_samples_ = last_imu_ && last_imu_->accel == message.accel ? equal_accel_samples_ + 1 : 0;
   last_imu_ = message;
 }
 

@@ -66,9 +66,10 @@ struct Housekeeping {
 
 /// Signs of a sick sensor behind valid frames.
 struct SensorHealth {
-  int rejected_in_a_row = 0;   ///< frames with absurd content since the last good one of their type; the worst type
-  std::string rejected_field;  ///< the field of it that was refused last
-  int equal_imu_samples = 0;   ///< inertial samples in a row with identical values
+  int rejected_in_a_row = 0;  ///< frames with absurd content since the last good one of their type; the worst type
+  std::string rejected_field = {};  ///< the field of it that was refused last
+  int equal_gyro_samples = 0;       ///< inertial samples in a row with the turn rates of the one before
+  int equal_accel_samples = 0;
 };
 
 /// Bytes of an L1 in; checked, paired and counted packets out, in sensor axes and without stamps. The counters of the
@@ -128,7 +129,8 @@ class PacketStream {
   Rejections auxiliaries_rejected_;
   Rejections distances_rejected_;
   Rejections samples_rejected_;
-  int equal_imu_samples_ = 0;
+  int equal_gyro_samples_ = 0;
+  int equal_accel_samples_ = 0;
 };
 
 }  // namespace ignis::l1

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/sensor_watch.h"
 
+#include <algorithm>
 #include <format>
 #include <utility>
 
@@ -13,6 +14,8 @@ constexpr Utime kStandbyUs = 1'000'000;
 constexpr Utime kPatienceUs = 1'000'000;
 constexpr Utime kProbationUs = 1'000'000;
 constexpr int kFrozenSamples = 25;
+/// A second: at rest the steps of one of the two alone may be coarser than its noise.
+constexpr int kHalfFrozenSamples = 250;
 constexpr int kRejectedIsFault = 50;
 
 }  // namespace
@@ -77,8 +80,14 @@ SensorReport SensorWatch::judge_streams(Utime now, const SensorHealth& health) c
     return {SensorState::kStandby, Severity::kDegraded, "inertial data only: standby, or the rotor is blocked"};
   }
   if (no_packets) return {SensorState::kRunning, Severity::kDegraded, "inertial data come, but no scans"};
-  if (health.equal_imu_samples >= kFrozenSamples) {
+  if (std::min(health.equal_gyro_samples, health.equal_accel_samples) >= kFrozenSamples) {
     return {SensorState::kRunning, Severity::kDegraded, "inertial values are frozen"};
+  }
+  if (health.equal_gyro_samples >= kHalfFrozenSamples) {
+    return {SensorState::kRunning, Severity::kDegraded, "values of the gyro are frozen"};
+  }
+  if (health.equal_accel_samples >= kHalfFrozenSamples) {
+    return {SensorState::kRunning, Severity::kDegraded, "values of the accelerometer are frozen"};
   }
   return {SensorState::kRunning, Severity::kOk, "running"};
 }

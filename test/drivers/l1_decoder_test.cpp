@@ -208,7 +208,8 @@ TEST(L1Decoder, NoticesFrozenInertialValuesAndSaturation) {
   Bytes stream;
   for (std::uint16_t id = 0; id < 40; ++id) append(stream, samples::frame(kImuId, samples::imu(id)));
   (void)decode_all(decoder, stream);
-  EXPECT_EQ(decoder.health().equal_imu_samples, 39);
+  EXPECT_EQ(decoder.health().equal_gyro_samples, 39);
+  EXPECT_EQ(decoder.health().equal_accel_samples, 39);
 
   L1Decoder fresh(capture_config(), plain_mount());
   ImuAttitude clipped = samples::imu(1);
@@ -216,6 +217,44 @@ TEST(L1Decoder, NoticesFrozenInertialValuesAndSaturation) {
   const Output output = decode_all(fresh, samples::frame(kImuId, clipped));
   ASSERT_EQ(output.imu.size(), 1U);
   EXPECT_TRUE(output.imu[0].saturated);
+}
+
+/// The judgement after `seconds` at 250 Hz, scans among them; `move` alters what the unit tells of a sample.
+SensorReport after_samples(double seconds, void (*move)(ImuAttitude& sample)) {
+  L1Decoder decoder(capture_config(), plain_mount());
+  SensorWatch watch("a port");
+  SensorReport report;
+  for (std::uint16_t id = 0; id < seconds * 250; ++id) {
+    ImuAttitude sample = samples::imu(id);
+    move(sample);
+    Bytes stream = samples::frame(kImuId, sample);
+    append(stream, samples::frame(kAuxiliaryId, samples::auxiliary(id)));
+    append(stream, samples::frame(kDistanceId, samples::distance(id)));
+    (void)decoder.feed(stream, 0);
+    report = watch.look(1'000'000 + 4'000 * id, true, decoder.counters(), decoder.health());
+  }
+  return report;
+}
+
+TEST(Fault_D3, HalfAnInertialUnitThatIsFrozenIsNamed) {
+  const auto only_forces_move = [](ImuAttitude& sample) { sample.accel[1] += 0.01F * (sample.packet_id % 7); };
+  const auto only_rates_move = [](ImuAttitude& sample) { sample.gyro[1] += 0.01F * (sample.packet_id % 7); };
+  const auto nothing_moves = [](ImuAttitude&) {};
+  EXPECT_EQ(after_samples(0.4, nothing_moves).text, "inertial values are frozen");
+  for (const auto& [move, text] : {std::pair{+only_forces_move, "values of the gyro are frozen"},
+                                   std::pair{+only_rates_move, "values of the accelerometer are frozen"}}) {
+    const SensorReport report = after_samples(1.5, move);
+    EXPECT_EQ(report.severity, Severity::kDegraded);
+    EXPECT_EQ(report.text, text);
+  }
+}
+
+TEST(Fault_D3, AQuietSensorThatRepeatsItsValuesForAWhileIsNotFrozen) {
+  const auto coarse = [](ImuAttitude& sample) {
+    sample.accel[2] += 0.01F * (sample.packet_id % 3);
+    sample.gyro[0] += sample.packet_id % 200 == 0 ? 0.001F : 0.0F;
+  };
+  EXPECT_EQ(after_samples(3.0, coarse).text, "running");
 }
 
 TEST(L1Decoder, CountsFilteredPoints) {

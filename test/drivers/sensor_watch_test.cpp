@@ -84,11 +84,10 @@ TEST_F(SensorWatchTest, CallsBytesWithoutFramesAFaultAndTellsHowMany) {
 
 TEST_F(SensorWatchTest, ReportsFrozenAndImpossibleValues) {
   (void)run(2.0, true, true);
-  EXPECT_EQ(run(0.05, true, true, {.rejected_in_a_row = 0, .rejected_field = "", .equal_imu_samples = 25}).text,
+  EXPECT_EQ(run(0.05, true, true, {.equal_gyro_samples = 25, .equal_accel_samples = 25}).text,
             "inertial values are frozen");
   counters_.rejected_values += 50;
-  const SensorReport report =
-      run(0.05, true, true, {.rejected_in_a_row = 50, .rejected_field = "theta_angle", .equal_imu_samples = 0});
+  const SensorReport report = run(0.05, true, true, {.rejected_in_a_row = 50, .rejected_field = "theta_angle"});
   EXPECT_EQ(report.severity, Severity::kFault);
   EXPECT_NE(report.text.find("theta_angle"), std::string::npos);
 }
