@@ -34,7 +34,7 @@ ExitCode play_capture(const Application& application, const std::string& path) {
   driver.time_source = "counters";
   l1::L1Decoder decoder(driver, application.config.extrinsics);
   LcmLink bus(application);
-  DriverPublisher publisher(bus, decoder, path);
+  DriverPublisher publisher(bus, decoder, path, 0);
   const bool paced = !application.config.lcm.url.starts_with("file:");
 
   std::optional<Utime> pace_offset;

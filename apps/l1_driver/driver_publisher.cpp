@@ -1,14 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driver_publisher.h"
 
+#include <limits>
 #include <utility>
 
 #include "ignis/driver_status_t.hpp"
 #include "ignis/health_t.hpp"
 #include "messages/sensor_messages.h"
 #include "runtime/channels.h"
+#include "runtime/steady_time.h"
 
 namespace ignis::runtime {
+namespace {
+
+constexpr std::int64_t kMaxEpoch = std::numeric_limits<std::int32_t>::max();
+
+}  // namespace
+
+std::int32_t epoch_of_start() { return static_cast<std::int32_t>(steady_now() / 1000 & kMaxEpoch); }
 
 void DriverPublisher::publish(const l1::Event& event) {
   if (const auto* sample = std::get_if<ImuSample>(&event)) {
@@ -63,7 +72,7 @@ void DriverPublisher::publish_status(const l1::SensorReport& report, const LinkR
   status.points_published = counters.points_published;
   status.points_filtered = counters.points_filtered;
   status.foreign_datagrams = link.refused;
-  status.clock_epoch = static_cast<std::int32_t>(counters.restarts);
+  status.clock_epoch = static_cast<std::int32_t>((first_epoch_ + counters.restarts) & kMaxEpoch);
   status.sensor_time_s = housekeeping.sensor_time_s;
   status.clock_offset_us = decoder_.clock().offset_us();
   status.clock_drift_ppm = decoder_.clock().drift_ppm();

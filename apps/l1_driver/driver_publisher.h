@@ -14,12 +14,16 @@ struct LinkReport {
   std::string trouble = {};  ///< of the recording; empty: none
 };
 
+/// The first clock epoch of a live driver: its start [ms]. No two restarts of the sensor's counters are nearer to each
+/// other than that, so what follows a killed driver repeats none of its epochs.
+[[nodiscard]] std::int32_t epoch_of_start();
+
 /// Puts what the decoder gives on the bus: L1_IMU, L1_SCAN, and once a second L1_STATUS and HEALTH.
 class DriverPublisher {
  public:
-  /// `source`: the port or file in words.
-  DriverPublisher(LcmLink& bus, const l1::L1Decoder& decoder, std::string source)
-      : bus_(bus), decoder_(decoder), watch_(std::move(source)) {}
+  /// `source`: the port or file in words. `first_epoch`: of the stamps' clock, counted up from there.
+  DriverPublisher(LcmLink& bus, const l1::L1Decoder& decoder, std::string source, std::int32_t first_epoch)
+      : bus_(bus), decoder_(decoder), watch_(std::move(source)), first_epoch_(first_epoch) {}
 
   void publish(const l1::Event& event);
 
@@ -33,6 +37,7 @@ class DriverPublisher {
   LcmLink& bus_;
   const l1::L1Decoder& decoder_;
   l1::SensorWatch watch_;
+  std::int32_t first_epoch_;
   Utime last_status_ = 0;
   l1::SensorState last_state_ = l1::SensorState::kWaiting;
   l1::Severity last_severity_ = l1::Severity::kOk;

@@ -30,7 +30,7 @@ LiveDriver::LiveDriver(const Application& application, const std::string& record
     : driver_(application.config.driver),
       decoder_(driver_, application.config.extrinsics),
       bus_(application),
-      publisher_(bus_, decoder_, std::format("{} at {} baud", driver_.port, driver_.baud)),
+      publisher_(bus_, decoder_, std::format("{} at {} baud", driver_.port, driver_.baud), epoch_of_start()),
       recording_(recording.empty() ? std::nullopt : std::optional<RawRecording>(recording)),
       link_(first_link(driver_)) {}
 

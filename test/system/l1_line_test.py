@@ -322,18 +322,40 @@ def test_commands_reach_a_sensor_that_ignores_some(bench: Bench, ask: Callable[.
     assert words.index("standby") < words.index("normal mode")
 
 
+def _clock_epochs(recording: Recording) -> dict[int, float]:
+    """When [us] each was announced first, in this order."""
+    announced: dict[int, float] = {}
+    for event in recording.on("L1_STATUS"):
+        announced.setdefault(event.message.clock_epoch, event.utime)
+    return announced
+
+
 def test_power_cycle_and_early_wrap_are_survived(bench: Bench) -> None:
     bench.start_sensor("--duration", 12, "--power-cycle-at", 6, "--power-off", 2, "--id-modulus", 1024)
     bench.start_driver(bench.port)
     bench.wait_for_end_of_sensor()
     recording = bench.recording()
     samples = recording.on("L1_IMU")
+    resumed = next(b for a, b in itertools.pairwise(samples) if b.utime - a.utime > 1e6)
+    first, second = list(epochs := _clock_epochs(recording))[:2]
+    assert second > first and abs(epochs[second] - resumed.utime) < 1e6
     assert recording.messages("L1_STATUS")[-1].imu_published == 10 * 250 + 1
     errors = _stamp_errors_us(recording)
     _show("power cycle", errors)
     assert np.abs(errors).max() < 20_000
     _assert_stamps_increase(samples)
     _assert_stamps_increase(recording.scans())
+
+
+def test_fault_p1_a_driver_that_is_killed_is_followed_by_another_clock_epoch(bench: Bench) -> None:
+    bench.start_sensor("--duration", 60)
+    for _ in range(2):
+        bench.start_driver(bench.port)
+        time.sleep(2.0)
+        bench.pipeline.processes["l1_driver"].kill()
+        bench.pipeline.processes["l1_driver"].wait()
+    first, second = _clock_epochs(bench.recording())
+    assert second > first, "no epoch is announced twice"
 
 
 def test_raw_recording_decodes_to_what_was_published(bench: Bench, run_binary: Callable[..., Any]) -> None:
