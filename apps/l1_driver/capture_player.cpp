@@ -45,7 +45,7 @@ ExitCode play_capture(const Application& application, const std::string& path) {
       if (paced) std::this_thread::sleep_for(std::chrono::microseconds(due + *pace_offset - steady_now()));
       publisher.publish(event);
     }
-    publisher.report(paced ? steady_now() : decoder.newest_utime(), {.connected = true});
+    publisher.report(paced ? steady_now() : decoder.newest_utime(), {});
   };
   std::array<char, 1024> buffer{};
   while (!stop_requested() && (file.read(buffer.data(), std::ssize(buffer)) || file.gcount() > 0)) {

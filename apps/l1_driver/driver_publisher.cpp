@@ -28,7 +28,7 @@ void DriverPublisher::publish(const l1::Event& event) {
 }
 
 void DriverPublisher::report(Utime now, const LinkReport& link) {
-  const l1::SensorReport sensor = watch_.look(now, link.connected, decoder_.counters(), decoder_.health());
+  const l1::SensorReport sensor = watch_.look(now, link.closed_because, decoder_.counters(), decoder_.health());
   report_health(sensor, link);
   // On change of the judgement, not of its figures: a line that stays bad must not flood the bus.
   const bool changed = sensor.state != last_state_ || sensor.severity != last_severity_;

@@ -9,9 +9,9 @@ namespace ignis::runtime {
 
 /// How the driver's own surroundings are.
 struct LinkReport {
-  bool connected = false;
-  std::int64_t refused = 0;  ///< deliveries from strangers
-  std::string trouble = {};  ///< of the recording; empty: none
+  std::string closed_because = {};  ///< empty while the port is open
+  std::int64_t refused = 0;         ///< deliveries from strangers
+  std::string trouble = {};         ///< of the recording; empty: none
 };
 
 /// The first clock epoch of a live driver: its start [ms]. No two restarts of the sensor's counters are nearer to each

@@ -4,6 +4,7 @@
 #include <format>
 #include <iostream>
 #include <thread>
+#include <utility>
 
 #include "runtime/stop_signal.h"
 
@@ -13,17 +14,6 @@ namespace {
 constexpr int kReadTimeoutMs = 50;
 constexpr std::chrono::milliseconds kReconnectPause{200};
 
-/// A supervised driver waits for a port that is not there yet, like for one that was lost.
-std::unique_ptr<l1::ByteLink> first_link(const DriverConfig& driver) {
-  try {
-    return l1::open_link(driver.port, driver.baud);
-  } catch (const l1::LinkError& error) {
-    if (!ServiceNotifier::is_supervised()) throw;
-    std::cerr << std::format("l1_driver: {}, trying again\n", error.what());
-    return nullptr;
-  }
-}
-
 }  // namespace
 
 LiveDriver::LiveDriver(const Application& application, const std::string& recording)
@@ -31,8 +21,15 @@ LiveDriver::LiveDriver(const Application& application, const std::string& record
       decoder_(driver_, application.config.extrinsics),
       bus_(application),
       publisher_(bus_, decoder_, std::format("{} at {} baud", driver_.port, driver_.baud), epoch_of_start()),
-      recording_(recording.empty() ? std::nullopt : std::optional<RawRecording>(recording)),
-      link_(first_link(driver_)) {}
+      recording_(recording.empty() ? std::nullopt : std::optional<RawRecording>(recording)) {
+  try {
+    link_ = l1::open_link(driver_.port, driver_.baud);
+  } catch (const l1::LinkError& error) {
+    // A supervised driver waits for a port that is not there yet, like for one that was lost.
+    if (!ServiceNotifier::is_supervised()) throw;
+    close(error.what());
+  }
+}
 
 ExitCode LiveDriver::run() {
   std::cout << std::format("l1_driver: reading {}\n", driver_.port) << std::flush;
@@ -52,10 +49,15 @@ void LiveDriver::step() {
       reopen();
     }
   } catch (const l1::LinkError& error) {
-    if (link_) std::cerr << std::format("l1_driver: {}, trying again\n", error.what());
-    link_.reset();
+    close(error.what());
   }
   report();
+}
+
+void LiveDriver::close(const std::string& reason) {
+  link_.reset();
+  if (std::exchange(closed_because_, reason) == reason) return;
+  std::cerr << std::format("l1_driver: {}, trying again\n", reason);
 }
 
 void LiveDriver::exchange() {
@@ -72,6 +74,7 @@ void LiveDriver::exchange() {
 void LiveDriver::reopen() {
   std::this_thread::sleep_for(kReconnectPause);
   link_ = l1::open_link(driver_.port, driver_.baud);
+  closed_because_.clear();
   std::cerr << std::format("l1_driver: {} is back\n", driver_.port);
 }
 
@@ -90,7 +93,7 @@ void LiveDriver::report() {
     last_flush_ = now;
     recording_->flush();
   }
-  publisher_.report(now, {.connected = link_ != nullptr,
+  publisher_.report(now, {.closed_because = closed_because_,
                           .refused = link_ ? link_->refused() : 0,
                           .trouble = recording_ ? recording_->trouble() : ""});
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "driver_publisher.h"
 #include "drivers/byte_link.h"
@@ -24,6 +25,7 @@ class LiveDriver {
 
  private:
   void step();
+  void close(const std::string& reason);
   void exchange();
   void reopen();
   void ask_for_version();
@@ -36,6 +38,7 @@ class LiveDriver {
   HostClock host_clock_;
   std::optional<RawRecording> recording_;
   std::unique_ptr<l1::ByteLink> link_;
+  std::string closed_because_;  // newest reason; empty while the link is open
   std::array<std::byte, 4096> buffer_{};
   Utime last_request_ = 0;
   Utime last_flush_ = 0;

@@ -27,14 +27,16 @@ void SensorWatch::Activity::update(std::int64_t count, Utime now) {
   ever = true;
 }
 
-SensorReport SensorWatch::look(Utime now, bool connected, const DecoderCounters& counters, const SensorHealth& health) {
+SensorReport SensorWatch::look(Utime now, std::string_view closed_because, const DecoderCounters& counters,
+                               const SensorHealth& health) {
+  const bool connected = closed_because.empty();
   if (connected && !was_connected_) connected_at_ = now;
   was_connected_ = connected;
   bytes_.update(counters.framing.bytes, now);
   imu_.update(counters.imu_published, now);
   packets_.update(counters.pairing.paired, now);
   rejections_.update(counters.rejected_values, now);
-  SensorReport report = judge(now, connected, health);
+  SensorReport report = judge(now, closed_because, health);
   if (report.severity != Severity::kOk) {
     trouble_at_ = now;
     trouble_ = report.text;
@@ -45,8 +47,10 @@ SensorReport SensorWatch::look(Utime now, bool connected, const DecoderCounters&
   return report;
 }
 
-SensorReport SensorWatch::judge(Utime now, bool connected, const SensorHealth& health) const {
-  if (!connected) return {SensorState::kDisconnected, Severity::kFault, std::format("{} is gone, trying again", link_)};
+SensorReport SensorWatch::judge(Utime now, std::string_view closed_because, const SensorHealth& health) const {
+  if (!closed_because.empty()) {
+    return {SensorState::kDisconnected, Severity::kFault, std::format("{}: {}; trying again", link_, closed_because)};
+  }
   // What no longer comes is no longer wrong: it is missing.
   if (health.rejected_in_a_row >= kRejectedIsFault && !rejections_.quiet_for(now, kStreamMissingUs)) {
     return {SensorState::kRunning, Severity::kFault,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "common/time.h"
 #include "drivers/l1_decoder.h"
@@ -31,8 +32,8 @@ class SensorWatch {
   /// `link`: the port in words, such as "/dev/ttyUSB0 at 2000000 baud".
   explicit SensorWatch(std::string link) : link_(std::move(link)) {}
 
-  /// `connected`: the port is open. Returns the judgement as of `now`.
-  [[nodiscard]] SensorReport look(Utime now, bool connected, const DecoderCounters& counters,
+  /// `closed_because`: why the port is not open; empty while it is. Returns the judgement as of `now`.
+  [[nodiscard]] SensorReport look(Utime now, std::string_view closed_because, const DecoderCounters& counters,
                                   const SensorHealth& health);
 
  private:
@@ -44,7 +45,7 @@ class SensorWatch {
     void update(std::int64_t count, Utime now);
     [[nodiscard]] bool quiet_for(Utime now, Utime duration) const { return !ever || now - moved_at > duration; }
   };
-  [[nodiscard]] SensorReport judge(Utime now, bool connected, const SensorHealth& health) const;
+  [[nodiscard]] SensorReport judge(Utime now, std::string_view closed_because, const SensorHealth& health) const;
   [[nodiscard]] SensorReport judge_silence(Utime now) const;
   [[nodiscard]] SensorReport judge_streams(Utime now, const SensorHealth& health) const;
 

@@ -182,7 +182,7 @@ TEST(Fault_D2, AbsurdValuesOfOneMessageAreAFaultAmongGoodOnesOfTheOthers) {
       append(stream, samples::frame(kAuxiliaryId, angles));
       append(stream, samples::frame(kDistanceId, samples::distance(id)));
       (void)decoder.feed(stream, 0);
-      report = watch.look(1'000'000 + 4'000 * id, true, decoder.counters(), decoder.health());
+      report = watch.look(1'000'000 + 4'000 * id, "", decoder.counters(), decoder.health());
       EXPECT_EQ(report.severity == Severity::kFault, id >= 50) << id << ": " << report.text;
     }
     EXPECT_EQ(decoder.counters().rejected_values, 60);
@@ -231,7 +231,7 @@ SensorReport after_samples(double seconds, void (*move)(ImuAttitude& sample)) {
     append(stream, samples::frame(kAuxiliaryId, samples::auxiliary(id)));
     append(stream, samples::frame(kDistanceId, samples::distance(id)));
     (void)decoder.feed(stream, 0);
-    report = watch.look(1'000'000 + 4'000 * id, true, decoder.counters(), decoder.health());
+    report = watch.look(1'000'000 + 4'000 * id, "", decoder.counters(), decoder.health());
   }
   return report;
 }

@@ -16,7 +16,7 @@ class SensorWatchTest : public ::testing::Test {
       if (imu) counters_.imu_published += 12;
       if (packets) counters_.pairing.paired += 9;
       if (imu || packets) counters_.framing.bytes += 5000;
-      report = watch_.look(now_, true, counters_, health);
+      report = watch_.look(now_, "", counters_, health);
     }
     return report;
   }
@@ -25,7 +25,7 @@ class SensorWatchTest : public ::testing::Test {
     for (int i = 0; i < seconds * 20; ++i) {
       now_ += 50'000;
       counters_.framing.bytes += 1000;
-      report = watch_.look(now_, true, counters_, {});
+      report = watch_.look(now_, "", counters_, {});
     }
     return report;
   }
@@ -102,9 +102,10 @@ TEST_F(SensorWatchTest, ForgetsImpossibleValuesOfAMessageThatNoLongerComes) {
 
 TEST_F(SensorWatchTest, TellsAClosedPortFromASilentOne) {
   (void)run(2.0, true, true);
-  const SensorReport report = watch_.look(now_, false, counters_, {});
+  const SensorReport report = watch_.look(now_, "no permission", counters_, {});
   EXPECT_EQ(report.state, SensorState::kDisconnected);
   EXPECT_EQ(report.severity, Severity::kFault);
+  EXPECT_EQ(report.text, "/dev/ttyUSB7 at 2000000 baud: no permission; trying again");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The real driver on the line of the simulated sensor: over a serial port (pty) and over UDP, both ways."""
 
+import fcntl
 import itertools
 import os
 import re
@@ -213,6 +214,25 @@ def test_driver_comes_back_with_the_cable(bench: Bench) -> None:
     assert any(e.utime > returned and e.message.state == e.message.OK for e in recording.driver_health())
     _assert_stamps_increase(recording.on("L1_IMU"))
     _assert_stamps_increase(recording.scans())
+
+
+def test_fault_d6_a_port_that_comes_back_busy_is_not_called_gone(bench: Bench) -> None:
+    bench.start_sensor("--duration", 60)
+    bench.start_driver(bench.port)
+    time.sleep(1.0)
+    bench.pipeline.stop("l1_sim")
+    sensor, other_reader = os.openpty()
+    fcntl.flock(other_reader, fcntl.LOCK_EX)
+    bench.port.unlink(missing_ok=True)
+    bench.port.symlink_to(os.ttyname(other_reader))
+    time.sleep(1.5)
+    words = bench.pipeline.last_words("l1_driver")
+    told = bench.recording().driver_health()[-1].message
+    os.close(sensor)
+    os.close(other_reader)
+    assert told.state == told.FAULT and "in use by another process" in told.state_text
+    assert f"{bench.port} at 2000000 baud" in told.state_text and "is gone" not in told.state_text
+    assert words.count("in use by another process") == 1, "the log tells each reason once"
 
 
 def test_standby_stops_the_scans_and_normal_brings_them_back(bench: Bench, tmp_path: Path) -> None:
