@@ -69,6 +69,7 @@ Json map_json(const HudData& data) {
           {"refused",
            {{"clouds", data.refused_clouds},
             {"poses", data.refused_poses},
+            {"points", data.refused_points},
             {"of_other_sessions", data.refused_of_other_sessions}}},
           {"keyframes_given_up", data.keyframes_given_up},
           {"health", data.health},

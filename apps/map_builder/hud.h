@@ -41,6 +41,7 @@ struct HudData {
   std::int64_t messages_repeated = 0;  ///< parts of keyframes that were whole already
   std::int64_t refused_clouds = 0;
   std::int64_t refused_poses = 0;
+  std::int64_t refused_points = 0;  ///< at poses that are sound
   std::int64_t refused_of_other_sessions = 0;
   std::int64_t keyframes_given_up = 0;  ///< their clouds never came
   std::string health;                   ///< state_text of this process

@@ -30,6 +30,18 @@ std::string given_up_text(std::int64_t keyframes) {
   return std::format("the clouds of {} keyframes are given up: nobody sends them again", keyframes);
 }
 
+/// Empty while nothing was dropped.
+std::string drops_text(std::int64_t clouds) {
+  if (clouds == 0) return {};
+  return std::format("map.max_keyframe_points is reached, the {} farthest keyframe clouds are dropped", clouds);
+}
+
+std::string refusal_text(const HudData& hud) {
+  const std::string text = std::format("{} clouds and {} poses refused", hud.refused_clouds, hud.refused_poses);
+  if (hud.refused_points == 0) return text;
+  return std::format("{}, and {} points that no map can hold", text, hud.refused_points);
+}
+
 double now_s() { return seconds(std::chrono::steady_clock::now().time_since_epoch()); }
 
 }  // namespace
@@ -301,6 +313,7 @@ void MapProcess::update_status() {
   hud_.rebuilding = map_.rebuilding();
   hud_.state_age_s = seconds(Clock::now() - last_state_);
   hud_.refused_poses = refused_messages_ + map_.refused_poses();
+  hud_.refused_points = map_.refused_points();
   hud_.keyframes_given_up = keyframe_requests_.given_up();
   keyframe_counts_->queue_drops = keyframes_.incomplete() + hud_.keyframes_given_up;
   hud_.messages_lost = clouds_.incomplete() + keyframes_.incomplete() + revisions_.incomplete();
@@ -320,9 +333,12 @@ void MapProcess::update_status() {
 std::string MapProcess::trouble() {
   const auto now = Clock::now();
   const bool session_trouble = other_sessions_.look(hud_.refused_of_other_sessions, now);
-  const bool refusal = refusals_.look(hud_.refused_clouds + hud_.refused_poses, now);
+  const bool refusal = refusals_.look(hud_.refused_clouds + hud_.refused_poses + hud_.refused_points, now);
   const bool loss = given_up_.look(hud_.keyframes_given_up, now);
-  if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
+  const std::string drops = drops_text(map_.clouds().dropped());
+  if (map_.voxels().coarsening() > 0) {
+    return "map.max_voxels is reached, the finest level is left out" + (drops.empty() ? "" : "; " + drops);
+  }
   if (std::string failure = lasting_.failure(); !failure.empty()) return failure;
   if (std::string missing = missed_.trouble(now_s()); !missing.empty()) return missing;
   if (!journal_damage_.empty() && now_s() - journal_damage_s_ < MissedScans::kTold_s) return journal_damage_;
@@ -330,9 +346,9 @@ std::string MapProcess::trouble() {
     return std::format("{} messages of another session than {} refused", hud_.refused_of_other_sessions,
                        session_.value_or(0));
   }
-  if (refusal) return std::format("{} clouds and {} poses refused", hud_.refused_clouds, hud_.refused_poses);
+  if (refusal) return refusal_text(hud_);
   if (loss) return given_up_text(hud_.keyframes_given_up);
-  return {};
+  return drops;  // for the rest of the drive, so behind all that is news
 }
 
 void MapProcess::report() {

@@ -90,10 +90,14 @@ KeyframeClouds::Kept KeyframeClouds::add_keyframe(std::int32_t id, std::span<con
     return insert_open(points_body, Pose{}, false);
   }
   auto cloud = std::make_shared<CloudData>();
+  std::size_t unusable = 0;
   which_.clear();
   for (std::uint32_t i = 0; i < points_body.size(); ++i) {
     const auto kept = sound(points_body[i].position.cast<double>(), points_body[i].intensity);
-    if (!kept) continue;
+    if (!kept) {
+      ++unusable;
+      continue;
+    }
     cloud->points.push_back(*kept);
     which_.push_back(i);
   }
@@ -102,7 +106,7 @@ KeyframeClouds::Kept KeyframeClouds::add_keyframe(std::int32_t id, std::span<con
   blocks_ += cloud->blocks.size();
   const std::span<const CloudPoint> kept = cloud->points;
   entries_[id] = {T_odom_keyframe, std::move(cloud)};
-  return {id, kept, which_};
+  return {id, kept, which_, unusable};
 }
 
 KeyframeClouds::Kept KeyframeClouds::add_scan(std::span<const CloudPoint> points_body, const Pose& T_odom_body) {
@@ -115,11 +119,15 @@ KeyframeClouds::Kept KeyframeClouds::insert_open(std::span<const CloudPoint> poi
   const std::size_t before = open_points_.size();
   const Eigen::Matrix3d R = T_keyframe_points.rotation.normalized().toRotationMatrix();
   const double per_metre = 1.0 / cell_m_;
+  std::size_t unusable = 0;
   which_.clear();
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p = R * points[i].position.cast<double>() + T_keyframe_points.translation;
     const auto kept = sound(p, points[i].intensity);
-    if (!kept) continue;
+    if (!kept) {
+      ++unusable;
+      continue;
+    }
     // The sensor stands near the body's origin; the few centimetres between are less than a cell.
     if (open_free_ && are_rays) open_free_->add_ray(T_keyframe_points.translation, p);
     if (open_free_ && !are_rays) open_free_->add_hit(p);
@@ -127,7 +135,7 @@ KeyframeClouds::Kept KeyframeClouds::insert_open(std::span<const CloudPoint> poi
     open_points_.push_back(*kept);
     which_.push_back(i);
   }
-  return {entries_.rbegin()->first, std::span(open_points_).subspan(before), which_};
+  return {entries_.rbegin()->first, std::span(open_points_).subspan(before), which_, unusable};
 }
 
 void KeyframeClouds::close_newest() {
@@ -180,6 +188,7 @@ void KeyframeClouds::clear() {
   open_cells_.clear();
   if (open_free_) std::ignore = open_free_->take();
   closed_points_ = blocks_ = free_cells_ = 0;
+  dropped_ = 0;
 }
 
 std::size_t KeyframeClouds::bytes() const {

@@ -37,6 +37,7 @@ class KeyframeClouds {
     std::int32_t id = 0;
     std::span<const CloudPoint> points;
     std::span<const std::uint32_t> which;  ///< their places among the points that were offered
+    std::size_t unusable = 0;              ///< points that no map can hold
   };
 
   KeyframeClouds(double cell_m, std::size_t max_points);
@@ -62,7 +63,7 @@ class KeyframeClouds {
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] std::size_t points() const { return closed_points_ + open_points_.size(); }
   [[nodiscard]] std::size_t bytes() const;
-  [[nodiscard]] std::int64_t dropped() const { return dropped_; }
+  [[nodiscard]] std::int64_t dropped() const { return dropped_; }  ///< clouds, since the last clear()
 
   /// The keyframe that takes the scans.
   [[nodiscard]] std::optional<std::int32_t> open_id() const;

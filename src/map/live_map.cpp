@@ -48,7 +48,7 @@ InsertCounts LiveMap::insert_scan(std::span<const CloudPoint> points_body, const
   const KeyframeClouds::Kept kept = clouds_.add_scan(points_body, T_odom_body);
   newest_kept_ = kept.which;
   InsertCounts counts = show(kept);
-  counts.known = points_body.size() - kept.points.size();
+  counts.known = points_body.size() - kept.points.size() - kept.unusable;
   drop_far_clouds();
   return counts;
 }
@@ -95,9 +95,13 @@ InsertCounts LiveMap::show(const KeyframeClouds::Kept& kept) {
   if (!map_.contains(kept.id)) map_.add_cloud(kept.id, newest_pose(kept.id));
   map_.set_open_cloud(clouds_.open_id());
   if (rebuilding_) arrivals_.push_back({kept.id, {kept.points.begin(), kept.points.end()}});
-  if (!drawing_) return {};
-  const InsertCounts counts = map_.insert(kept.id, kept.points);
-  map_.stay_within_bound(lookup());
+  InsertCounts counts;
+  if (drawing_) {
+    counts = map_.insert(kept.id, kept.points);
+    map_.stay_within_bound(lookup());
+  }
+  counts.rejected += kept.unusable;
+  refused_points_ += static_cast<std::int64_t>(counts.rejected);
   return counts;
 }
 

@@ -102,6 +102,7 @@ class LiveMap {
   [[nodiscard]] int rebuilds() const { return rebuilds_; }
   [[nodiscard]] std::int64_t reanchored() const { return reanchored_; }  ///< keyframes moved without a rebuild
   [[nodiscard]] std::int64_t refused_poses() const { return refused_poses_; }
+  [[nodiscard]] std::int64_t refused_points() const { return refused_points_; }  ///< at poses that are sound
 
   [[nodiscard]] std::vector<Eigen::Vector3f> odometry_path() const { return path_.odometry(); }
   [[nodiscard]] std::vector<Eigen::Vector3f> corrected_path() const;
@@ -161,6 +162,7 @@ class LiveMap {
   int rebuilds_ = 0;
   std::int64_t reanchored_ = 0;
   std::int64_t refused_poses_ = 0;
+  std::int64_t refused_points_ = 0;
 };
 
 }  // namespace ignis

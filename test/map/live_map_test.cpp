@@ -282,6 +282,27 @@ TEST(LiveMap, RefusesUnusablePosesAndCountsThem) {
   EXPECT_EQ(map.voxels().fingerprint(), before);
 }
 
+TEST(LiveMap, RefusesPointsThatNoMapCanHoldAndCountsThem) {
+  LiveMap map(MapConfig{});
+  drive(map, 9);
+  std::mt19937 generator(9);
+  std::vector<CloudPoint> cloud = random_cloud(generator, 10, 5, 2);
+  cloud[2].position.y() = std::numeric_limits<float>::quiet_NaN();
+  cloud[7].position.x() = 1e30F;
+  const InsertCounts counts = map.insert_scan(cloud, pose_at(18, 0, 0));
+  EXPECT_EQ(counts.rejected, 2U);
+  EXPECT_EQ(counts.inserted + counts.outside + counts.known, 8U);
+  EXPECT_TRUE(map.add_keyframe(keyframe(10, pose_at(20, 0, 0), cloud)));
+  EXPECT_TRUE(map.add_keyframe(keyframe(12, pose_at(24, 0, 0))));
+  EXPECT_TRUE(map.add_keyframe(keyframe(11, pose_at(22, 0, 0), cloud))) << "late";
+  EXPECT_EQ(map.refused_points(), 6);
+  EXPECT_EQ(map.refused_poses(), 0);
+  const std::string before = map.voxels().fingerprint();
+  for (CloudPoint& point : cloud) point.position.z() = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(map.insert_scan(cloud, pose_at(18, 0, 0)).rejected, 10U);
+  EXPECT_EQ(map.voxels().fingerprint(), before);
+}
+
 TEST(LiveMap, NamesTheKeyframesThatNeverCame) {
   LiveMap map(MapConfig{});
   map.add_keyframe(keyframe(0, Pose{}));

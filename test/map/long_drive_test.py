@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import time
 from pathlib import Path
 
@@ -56,4 +57,6 @@ def test_fault_m3_ten_kilometres_stay_within_the_bounds_and_say_that_these_are_r
     assert at_end < MAX_GROWTH * settled
     assert sum(told["voxels"]) <= MAX_VOXELS and told["voxels"][2] > 100
     assert told["health"].startswith("DEGRADED: map.max_voxels is reached")
+    dropped = re.search(r"map.max_keyframe_points is reached, the (\d+) farthest", told["health"])
+    assert dropped and int(dropped[1]) + told["keyframes"] > 0.9 * LENGTH_M / SPACING_M
     assert server.stop() == 0

@@ -2,10 +2,12 @@
 """Which drive the map shows: front ends that start cold, and messages of a session that nobody drives."""
 
 import json
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from map_drive import LARGEST, URL, Drive, forged_message, hall_scan
@@ -100,6 +102,25 @@ def test_a_refused_message_is_told_while_it_is_new_and_stays_counted(
     drive.wait_for(lambda status: "{} clouds and {} poses refused".format(*refused) in status["health"])
     status = drive.wait_for(lambda status: status["health"] == "OK")
     assert (status["refused"]["clouds"], status["refused"]["poses"]) == refused
+
+
+def test_fault_m1_points_that_no_map_can_hold_are_refused_and_counted(server: Server) -> None:
+    drive = FollowedDrive(server)
+    drive.advance_by(20)
+    drive.wait_for(lambda status: status["health"] == "OK" and status["clouds_inserted"] == 20)
+    scan = hall_scan([0.0, 0.0, 0.0], drive.generator)
+    mixed = scan.copy()
+    mixed[7] = [0.0, math.nan, 0.0]
+    drive.publish_cloud(drive.position(), mixed)
+    text = "0 clouds and 0 poses refused, and 1 points that no map can hold"
+    before = drive.wait_for(lambda status: text in status["health"])
+    assert before["clouds_inserted"] == 21, "the sound points of a mixed scan are used"
+    for value in (math.nan, 1e30):
+        drive.publish_cloud(drive.position(), np.full_like(scan, value))
+    after = drive.wait_for(lambda status: status["refused"]["clouds"] == 2)
+    assert after["refused"]["points"] == 1 + 2 * len(scan) and after["refused"]["poses"] == 0
+    assert after["clouds_inserted"] == 21 and after["voxels"] == before["voxels"]
+    drive.wait_for(lambda status: status["health"] == "OK")
 
 
 def test_keyframes_that_nobody_sends_are_given_up_by_name(server: Server) -> None:
