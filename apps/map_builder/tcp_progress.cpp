@@ -8,11 +8,11 @@
 
 namespace ignis {
 
-std::uint64_t bytes_acknowledged(int socket) {
+TcpProgress tcp_progress(int socket) {
   tcp_info info{};
   socklen_t size = sizeof info;
-  if (getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return 0;
-  return info.tcpi_bytes_acked;
+  if (getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return {};
+  return {.acknowledged = info.tcpi_bytes_acked, .is_complete = info.tcpi_unacked == 0 && info.tcpi_notsent_bytes == 0};
 }
 
 }  // namespace ignis

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map_builder/view_client.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -50,7 +51,7 @@ net::awaitable<void> ViewClient::serve(const Request& upgrade) {
   const auto [refused] = co_await stream_.async_accept(upgrade, kNoThrow);
   if (refused) co_return;
   open_ = true;
-  last_life_ = Clock::now();
+  last_life_ = last_progress_ = Clock::now();
   answers_.push_back({shared(context_.hello()), nullptr});
   context_.on_view_changed();
   net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, kRethrow);
@@ -145,9 +146,12 @@ void ViewClient::answer(Answer answer) {
 
 void ViewClient::check_life(TimePoint now) {
   if (!open_) return;
-  const std::uint64_t acknowledged = bytes_acknowledged(beast::get_lowest_layer(stream_).socket().native_handle());
-  if (std::exchange(acknowledged_, acknowledged) != acknowledged) last_life_ = now;
-  if (now - last_life_ < kLifeTimeout) return;
+  const TcpProgress progress = tcp_progress(beast::get_lowest_layer(stream_).socket().native_handle());
+  const bool has_moved = std::exchange(acknowledged_, progress.acknowledged) != progress.acknowledged;
+  if (has_moved) last_life_ = now;
+  if (has_moved || progress.is_complete) last_progress_ = now;
+  // Whoever reads nothing is not alive, however many pongs it sends.
+  if (now - std::min(last_life_, last_progress_) < kLifeTimeout) return;
   ++context_.counters.idle_closes;
   close();
 }

@@ -100,6 +100,7 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   TimePoint batch_began_{};
   std::chrono::steady_clock::duration round_trip_{};  // of the last batch
   TimePoint last_life_ = std::chrono::steady_clock::now();
+  TimePoint last_progress_ = last_life_;  // with what it is sent
   std::uint64_t acknowledged_ = 0;
 };
 

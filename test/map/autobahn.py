@@ -6,7 +6,7 @@ Not part of the test run: every release of the suite wants Python 2.7. Where the
     virtualenv -p python2.7 py27 && py27/bin/pip install autobahntestsuite==0.8.2
     ./ignis shell python3 test/map/autobahn.py --wstest py27/bin/wstest
 
-Exits with 1 when a case fails, or passes only loosely.
+Exits with 1 when a case fails, passes only loosely, or a group has not run.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 from ignis.pipeline import binary
@@ -44,6 +45,11 @@ def run_suite(wstest: Path, folder: Path) -> dict[str, dict[str, str]]:
     return json.loads((folder / "index.json").read_text())["ignis"]
 
 
+def groups_without_a_case(cases: Iterable[str]) -> set[int]:
+    """Which of the groups were not run: a suite that finds no server, or no case, ends without an error."""
+    return set(GROUPS) - {int(name.partition(".")[0]) for name in cases}
+
+
 def main() -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -55,7 +61,9 @@ def main() -> int:
     bad = {name for name, case in cases.items() if not {case["behavior"], case["behaviorClose"]} <= GOOD}
     if bad:
         print(f"not as they should: {', '.join(sorted(bad))}")
-    return 1 if bad else 0
+    if missing := groups_without_a_case(cases):
+        print(f"no case of the groups {', '.join(map(str, sorted(missing)))} has run")
+    return 1 if bad or missing else 0
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """map_builder's server against real sockets on 127.0.0.1. The bus is in memory: nothing reaches a network."""
 
+import contextlib
 import json
 import os
 import pathlib
@@ -10,6 +11,7 @@ import socket
 import struct
 import subprocess
 import time
+import zlib
 
 import pytest
 
@@ -105,6 +107,27 @@ def test_foreign_origin_is_refused_before_the_upgrade(server):
         assert status == 403, origin
 
 
+def test_fault_w8_one_more_origin_that_the_configuration_allows_is_let_in_and_no_other(start_server, tmp_path):
+    config = tmp_path / "config.json"
+    config.write_text('{"hmi": {"allowed_origin": "https://fleet.example:8443"}}')
+    running = start_server("--port", "0", "--config", str(config))
+    behind_a_proxy = "fleet.example:8443"
+    for origin, host, expected in (
+        ("https://fleet.example:8443", None, 101),
+        ("https://fleet.example:8443", behind_a_proxy, 101),
+        (f"http://127.0.0.1:{running.port}", None, 101),
+        ("https://fleet.example", None, 403),
+        ("http://fleet.example:8443", None, 403),
+        ("https://evil.example:8443", None, 403),
+        ("https://evil.example:8443", behind_a_proxy, 403),
+        ("https://fleet.example:8443", "evil.example:8443", 403),
+    ):
+        status, web_socket = running.upgrade(origin=origin, host=host)
+        web_socket.close()
+        assert status == expected, (origin, host)
+    assert running.stop() == 0
+
+
 def test_wrong_path_or_protocol_is_refused(server):
     assert server.upgrade(target="/ws/other")[0] == 404
     assert server.upgrade(protocol=None)[0] == 400
@@ -115,7 +138,6 @@ def test_wrong_path_or_protocol_is_refused(server):
 def test_upgrade_gives_a_first_frame_at_once(server):
     status, web_socket = server.upgrade(origin=f"http://127.0.0.1:{server.port}", protocol="other, " + PROTOCOL)
     assert status == 101 and f"Sec-WebSocket-Protocol: {PROTOCOL}" in web_socket.head
-    assert "permessage-deflate" not in web_socket.head
     hello = json.loads(web_socket.receive()[1])
     assert hello["type"] == "hello" and hello["version"] == 2
     assert hello["cell_m"] == [0.125, 0.25, 0.5] and hello["window_m"] == [10, 30, 100]
@@ -127,6 +149,14 @@ def test_upgrade_gives_a_first_frame_at_once(server):
     assert struct.unpack_from("<7f", frame) == (0, 0, 0, 1, 0, 0, 0)
     assert [struct.unpack_from("<fI", frame, 28 + 16 * k) for k in range(3)] == [(0.125, 0), (0.25, 0), (0.5, 0)]
     assert web_socket.text("hud")["map"]["voxels"] == [0, 0, 0]
+    web_socket.close()
+
+
+def test_fault_w4_compression_that_a_client_offers_is_not_taken_up(server):
+    status, web_socket = server.upgrade("Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits")
+    assert status == 101 and "sec-websocket-extensions" not in web_socket.head.lower()
+    web_socket.send(zlib.compress(b" " * 10_000_000), rsv1=True)
+    assert web_socket.close_code() == 1002, "the bit that marks compressed messages means nothing here"
     web_socket.close()
 
 
@@ -193,6 +223,20 @@ def test_a_client_that_answers_no_ping_is_closed_and_one_that_does_stays(server)
     assert 8 < time.monotonic() - began < 14
     assert lively.text("hud")
     lively.close()
+
+
+def test_fault_w1_a_client_that_reads_nothing_is_closed_though_it_sends_pongs(server):
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.connect(("127.0.0.1", server.port))
+    _, silent = server.upgrade(connection=connection)
+    began = time.monotonic()
+    with contextlib.suppress(ConnectionError):
+        while time.monotonic() < began + 30:
+            silent.send(b"", opcode=10)
+            time.sleep(0.1)
+    assert 10 < time.monotonic() - began < 25
+    silent.close()
 
 
 def test_a_binary_message_closes_1003(server):

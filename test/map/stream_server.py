@@ -102,9 +102,9 @@ class WebSocket:
     def __init__(self, connection, head):
         self.connection, self.head = connection, head
 
-    def send(self, payload, opcode=1, final=True, length=None):
+    def send(self, payload, opcode=1, final=True, length=None, rsv1=False):
         length = len(payload) if length is None else length
-        head = bytes([(0x80 if final else 0) | opcode])
+        head = bytes([(0x80 if final else 0) | (0x40 if rsv1 else 0) | opcode])
         if length < 126:
             head += bytes([0x80 | length])
         elif length < 65536:

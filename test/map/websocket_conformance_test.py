@@ -6,7 +6,9 @@ applies to a server that takes short texts. Where Autobahn expects an echo, the 
 """
 
 import json
+import sys
 
+import autobahn
 import pytest
 from websocket_frames import (
     BINARY,
@@ -191,3 +193,11 @@ def test_5_19_pings_between_many_fragments_are_answered_at_once(peer):
 def test_9_a_fragmented_message_above_the_limit_closes(peer):
     send(peer, frame(b" " * 40000, final=False), frame(b" " * 40000, CONTINUATION))
     expect_close(peer, TOO_BIG)
+
+
+@pytest.mark.parametrize(("groups", "code"), [(autobahn.GROUPS, 0), (autobahn.GROUPS[:-1], 1), ((), 1)])
+def test_fault_w3_an_autobahn_run_that_left_cases_out_has_failed(monkeypatch, groups, code):
+    good = {"behavior": "OK", "behaviorClose": "OK"}
+    monkeypatch.setattr(autobahn, "run_suite", lambda *_: {f"{group}.1.1": good for group in groups})
+    monkeypatch.setattr(sys, "argv", ["autobahn.py", "--wstest", "none"])
+    assert autobahn.main() == code
