@@ -27,13 +27,10 @@ Utime system_utime() {
       .count();
 }
 
-std::string cannot_open(const std::string& url) {
-  std::string text = std::format("cannot open the message bus {}.", url);
-  if (url.starts_with("udpm://")) {
-    text +=
-        " If multicast has no route, run: sudo ip link set lo up multicast on && sudo ip route add 224.0.0.0/4 dev lo";
-  }
-  return text;
+/// What mends a bus that cannot be reached.
+std::string remedy(const std::string& url) {
+  if (!url.starts_with("udpm://")) return {};
+  return " If multicast has no route, run: sudo ip link set lo up multicast on && sudo ip route add 224.0.0.0/4 dev lo";
 }
 
 }  // namespace
@@ -43,12 +40,13 @@ LcmLink::LcmLink(const Application& application)
                 .pid = getpid(),
                 .version = version(),
                 .config_hash = application.config_hash},
-      alone_(application.name, application.config.lcm.url),
-      lcm_(application.config.lcm.url),
-      address_(BusAddress::parse(application.config.lcm.url)),
+      url_(application.config.lcm.url),
+      alone_(application.name, url_),
+      lcm_(url_),
+      address_(BusAddress::parse(url_)),
       budget_(application.config.health.limits_of(application.name)),
       peers_(identity_) {
-  if (!lcm_.good()) throw UserError(cannot_open(application.config.lcm.url), kFailed);
+  if (!lcm_.good()) throw UserError(std::format("cannot open the message bus {}.{}", url_, remedy(url_)), kFailed);
 }
 
 void LcmLink::subscribe_raw(Receiver& receiver, int queue_capacity) {
@@ -173,6 +171,7 @@ std::string LcmLink::own_trouble() const {
   for (const PeerIdentity& late : ignored_) {
     add(std::format("{} {} came later and is not listened to", late.process, late.pid));
   }
+  add(sends_.trouble(uptime_s()));
   add(budget_.trouble());
   for (const Receiver& receiver : receivers_) {
     const std::string refusal = receiver.refusals.trouble(uptime_s());
@@ -183,7 +182,7 @@ std::string LcmLink::own_trouble() const {
 
 std::int8_t LcmLink::own_state() const {
   const auto taken = [this](const Receiver& receiver) { return receiver.refusals.is_taken_by_another(uptime_s()); };
-  const bool fault = peers_.needs_person(uptime_s()) || std::ranges::any_of(receivers_, taken);
+  const bool fault = sends_.is_mute() || peers_.needs_person(uptime_s()) || std::ranges::any_of(receivers_, taken);
   return fault ? health_t::FAULT : health_t::DEGRADED;
 }
 
@@ -192,6 +191,7 @@ void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& s
   hear_peers();
   ignore_latecomers();
   sample_budget();
+  sends_.look(failed_sends_, uptime_s());
   supervisor_.turn(progress_, uptime_s());
 
   health_t message{};
@@ -202,8 +202,9 @@ void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& s
     message.state_text = state == health_t::OK ? trouble : std::format("{}; {}", state_text, trouble);
   }
   const auto now = std::chrono::steady_clock::now();
-  // A text may hold figures that change all the time.
-  const bool due = now - last_health_ >= (message.state_text == last_state_text_ ? kHealthPeriod : kTextPeriod);
+  // A text may hold figures that change all the time. A bus that takes nothing is tried often, to be back early.
+  const bool is_calm = message.state_text == last_state_text_ && !sends_.is_mute();
+  const bool due = now - last_health_ >= (is_calm ? kHealthPeriod : kTextPeriod);
   if (!due && message.state == last_state_) return;
   if (message.state_text != last_state_text_) supervisor_.status(message.state_text);
   last_health_ = now;
@@ -241,7 +242,12 @@ void LcmLink::publish_health(health_t& message) {
   };
   for (const Receiver& receiver : receivers_) list(receiver.counts);
   if (socket_) list({.channel = kSocketName, .rejected = socket_->dropped()});
-  publish(channels::kHealth, message);
+  const bool sent = publish(channels::kHealth, message);
+  sends_.look(failed_sends_, message.uptime_s);
+  if (const std::string news = sends_.health_sent(sent, message.uptime_s); !news.empty()) {
+    const std::string advice = sent ? "" : std::format(" {}.{}", url_, remedy(url_));
+    std::cerr << std::format("{}: {}{}\n", identity_.process, news, advice);
+  }
 }
 
 }  // namespace ignis::runtime

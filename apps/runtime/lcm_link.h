@@ -23,6 +23,7 @@
 #include "runtime/instance_lock.h"
 #include "runtime/peer_watch.h"
 #include "runtime/refusals.h"
+#include "runtime/send_watch.h"
 #include "runtime/sender_addresses.h"
 #include "runtime/sequence_tracker.h"
 #include "runtime/service_notifier.h"
@@ -49,9 +50,12 @@ class LcmLink {
   /// Opens the bus. Throws UserError that says what to do (no multicast route, bad URL, a second instance).
   explicit LcmLink(const Application& application);
 
+  /// False when the message could not be sent; that is counted, and HEALTH tells it.
   template <class Message>
-  void publish(const std::string& channel, const Message& message) {
-    if (lcm_.publish(channel, &message) != 0) ++failed_sends_;
+  bool publish(const std::string& channel, const Message& message) {
+    const bool sent = lcm_.publish(channel, &message) == 0;
+    if (!sent) ++failed_sends_;
+    return sent;
   }
 
   /// Calls `handler` with each well-formed message. It may return why it refuses one, for HEALTH and the log: a string
@@ -90,9 +94,10 @@ class LcmLink {
   /// had arrived.
   void add_latency(double latency_ms) { budget_.add_latency(latency_ms); }
 
-  /// Publishes HEALTH when a second has passed, at once when `state` changed, and for a new text every 200 ms.
-  /// `utime`: newest measurement seen [us]. `state`: one of health_t's constants; OK becomes DEGRADED, with the reason,
-  /// when this process exceeds its limits, and FAULT when the processes on the bus do not belong together (PeerWatch).
+  /// Publishes HEALTH when a second has passed, at once when `state` changed, and for a new text, or while nothing can
+  /// be sent, every 200 ms. `utime`: newest measurement seen [us]. `state`: one of health_t's constants; OK becomes
+  /// DEGRADED, with the reason, when this process exceeds its limits, and FAULT when the processes on the bus do not
+  /// belong together (PeerWatch) or nothing can be sent to it (SendWatch).
   /// Call it at every turn of the main loop: the supervisor hears of readiness and progress here.
   void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
 
@@ -123,6 +128,7 @@ class LcmLink {
   [[nodiscard]] double uptime_s() const;
 
   PeerIdentity identity_;
+  std::string url_;
   InstanceLock alone_;
   lcm::LCM lcm_;
   std::deque<Receiver> receivers_;  // a deque keeps addresses stable
@@ -137,6 +143,7 @@ class LcmLink {
   std::int32_t health_sequence_ = 0;
   BudgetWatch budget_;
   PeerWatch peers_;
+  SendWatch sends_;
   bool watching_peers_ = false;
   std::optional<SenderAddresses> addresses_;
   std::vector<PeerIdentity> ignored_;

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows P7 and P8 at the real processes: stopped at any moment, frozen, out of memory; and a full disk."""
 
+import contextlib
+import math
 import os
 import random
 import resource
 import signal
+import socket
 import subprocess
 import time
 from pathlib import Path
@@ -19,6 +22,10 @@ PROCESSES = ("lio_frontend", "graph_backend", "map_builder", "l1_driver")
 SEED = 77
 STOPS = 6
 STOP_WITHIN_S = 2.0
+LOST_AT_S, BACK_AT_S = 2.0, 3.4  # the multicast route; a drive that is silent for three seconds begins anew
+FAULT_WITHIN_S = RESUMED_WITHIN_S = 1.0
+BUSY_S = 0.5  # that a busy machine may add
+MUTE = "nothing can be sent to the bus"
 LEAST_VOXEL_SHARE = 0.99  # two drives in real time are never quite the same
 
 
@@ -124,26 +131,67 @@ def test_fault_b3_a_receiver_frozen_for_two_seconds_loses_nothing(
     assert run.seen.keyframes == undisturbed.keyframes
 
 
-def test_fault_b7_a_route_lost_in_mid_drive_is_counted_and_its_return_resumes(drive_log: Path, tmp_path: Path) -> None:
-    route = ["224.0.0.0/4", "dev", "lo"]
-    with FaultRun(tmp_path, ("lio_frontend",)) as run:
-        state = {"lost": False, "back": False, "before": 0}
+class LostRoute:
+    """Takes the multicast route away in mid-drive and gives it back; notes when who says what of it."""
 
-        def meanwhile(seconds: float) -> None:
-            if seconds > 2.0 and not state["lost"]:
-                state["lost"], state["before"] = True, len(run.seen.states)
-                subprocess.run(["ip", "route", "del", *route], check=True)
-            if seconds > 3.5 and not state["back"]:
-                state["back"] = True
-                subprocess.run(["ip", "route", "add", *route], check=True)
+    route = ("224.0.0.0/4", "dev", "lo")
 
-        try:
-            run.play(drive_log, meanwhile)
-        finally:
-            subprocess.run(["ip", "route", "replace", *route], check=True)
-        newest = run.seen.health["lio_frontend"][-1]
-    assert state["back"] and len(run.seen.states) > state["before"] + 500, "the pose flows again"
-    assert newest.failed_sends > 0 or newest.lost[newest.channels.index("L1_IMU")] > 0, "the loss is counted"
+    def __init__(self, run: FaultRun, names: tuple[str, ...], supervisor: socket.socket) -> None:
+        self._run, self._names, self._supervisor = run, names, supervisor
+        supervisor.setblocking(False)
+        self.at: dict[str, float] = {}
+        self.statuses = 0  # that name the loss
+        self._states = 0
+
+    def look(self, seconds: float) -> None:
+        """Called often with the seconds since the drive began."""
+        if seconds > LOST_AT_S and "lost" not in self.at:
+            subprocess.run(["ip", "route", "del", *self.route], check=True)
+            self.at["lost"] = time.monotonic()
+        for name in self._names:
+            if MUTE in self._run.pipeline.last_words(name):
+                self.at.setdefault(name, time.monotonic())
+        with contextlib.suppress(BlockingIOError):
+            while message := self._supervisor.recv(4096).decode():
+                self.statuses += message.startswith("STATUS=") and MUTE in message
+                if self.statuses == len(self._names):
+                    self.at.setdefault("supervisor", time.monotonic())
+        if seconds > BACK_AT_S and "back" not in self.at:
+            self._states = len(self._run.seen.states)
+            self.give_back()
+            self.at["back"] = time.monotonic()
+        if "back" in self.at and len(self._run.seen.states) > self._states:
+            self.at.setdefault("flow", time.monotonic())
+
+    def give_back(self) -> None:
+        """There is a route again, or still."""
+        subprocess.run(["ip", "route", "replace", *self.route], check=True)
+
+
+def test_fault_b7_a_route_lost_in_mid_drive_is_a_fault_within_a_second_and_its_return_resumes(
+    drive_log: Path, tmp_path: Path
+) -> None:
+    # The one sends all the time, the other little but HEALTH.
+    names = ("lio_frontend", "graph_backend")
+    run = FaultRun(tmp_path, names)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.bind(str(tmp_path / "notify"))
+        run.pipeline.environment["NOTIFY_SOCKET"] = str(tmp_path / "notify")
+        with run:
+            lost = LostRoute(run, names, supervisor)
+            try:
+                run.play(drive_log, lost.look)
+            finally:
+                lost.give_back()
+    print({what: round(when - lost.at["lost"], 2) for what, when in lost.at.items()})
+    for who in (*names, "supervisor"):
+        assert lost.at.get(who, math.inf) - lost.at["lost"] < FAULT_WITHIN_S + BUSY_S
+    assert lost.at["flow"] - lost.at["back"] < RESUMED_WITHIN_S + BUSY_S
+    for name in names:
+        told = [message for message in run.seen.health[name] if message.failed_sends > 0]
+        assert told[0].state == told[0].FAULT and MUTE in told[0].state_text, "the first that gets through"
+        assert any("nothing could be sent to the bus for" in message.state_text for message in told)
+        assert told[-1].state != told[-1].FAULT, "and then it is over"
 
 
 def test_fault_l1_a_full_disk_ends_replay_and_map_with_the_path_and_no_half_file(
