@@ -43,7 +43,7 @@ void CheckpointFolder::save_keyframe(const Keyframe& keyframe) {
 
 void CheckpointFolder::write(const fs::path& path, std::span<const std::byte> bytes) {
   try {
-    FileOutput file(path);
+    FileOutput file(path, FileOutput::Sync::kNo);
     file.stream().write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
     file.commit();
     failure_.clear();
