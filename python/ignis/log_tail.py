@@ -69,6 +69,10 @@ class LogTail:
         while chunk := self._file.read(_CHUNK):
             self._take(self._rest + chunk)
 
+    def is_lost(self) -> bool:
+        """Whether what was read from is no longer there under its name."""
+        return self._file is not None and not self.path.exists()
+
     def follow(self, path: Path) -> None:
         """Goes on with another file of the same recording."""
         self.close()

@@ -3,8 +3,8 @@
 
 LCM's own logger writes; this command gives it the right bus, puts the configuration into the log (channel
 IGNIS_CONFIG, at the start and every ten seconds), shows what arrives and how much disk is left, and warns when messages
-are missing by their running numbers. When the logger dies, or the disk is nearly full for a while, the recording goes
-on in FILE-2.lcmlog, FILE-3.lcmlog and so on.
+are missing by their running numbers. When the logger dies, its file is removed, or the disk is nearly full or the
+folder gone for a while, the recording goes on in FILE-2.lcmlog, FILE-3.lcmlog and so on.
 """
 
 import argparse

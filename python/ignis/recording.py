@@ -24,15 +24,17 @@ _STOP_S = 10.0
 _LEAST_LIFE_S = 2.0  # of a logger that is worth starting again
 _HEALTH_PERIOD_S = 1.0
 _ROOM_AGAIN = 1.2  # of --keep-free-mb
+_FLUSH_MS = 50  # that a killed logger may cost; LCM's default is 100
 _DEFAULT_CONFIG = Path("config") / "ignis8_tuned.json"
 
 
 class Recording:
     """What is recorded into one file after another, and what is known about it.
 
-    A new file begins when the logger was killed, and when a disk that was nearly full has room again: what was written
-    is left as it is. While the disk is too full HEALTH says FAULT; a logger that was killed is succeeded at
-    once, a successor that ended at once after two seconds. HEALTH says OK once a successor has lived that long.
+    A new file begins when the logger was killed, when the file was removed, when a disk that was nearly full has room
+    again, and when a folder that was gone is back: what was written is left as it is. While the disk is too full or
+    the folder is gone HEALTH says FAULT; a logger that was killed is succeeded at once, a successor that ended at once
+    after two seconds. HEALTH says OK once a successor has lived that long.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -42,6 +44,7 @@ class Recording:
         default_url = os.environ.get("LCM_DEFAULT_URL") or self.config.get("lcm", {}).get("url", "")
         self.url: str = options.lcm_url or default_url
         self.output: Path = options.output or Path(f"ignis-{datetime.now():%Y%m%d-%H%M%S}.lcmlog")
+        self.folder = self.output.resolve().parent
         self._refuse_what_cannot_work()
         self.tail = LogTail(self.file(0))
         self.paused = False
@@ -80,12 +83,14 @@ class Recording:
         if existing and options.split_mb is not None:
             raise InputError(f"{existing[0]} exists, and split recordings never overwrite; choose another name with -o")
         if self.free_mb() < options.keep_free_mb:
-            raise InputError(f"only {self.free_mb():.0f} MB are free; --keep-free-mb is {options.keep_free_mb:.0f}")
+            room = f"only {self.free_mb():.0f} MB are free in {self.folder}"
+            raise InputError(f"{room}; --keep-free-mb is {options.keep_free_mb:.0f}")
 
     def _command(self) -> list[str]:
         options = self._options
         quota = f"--disk-quota={max(options.keep_free_mb / 2.0, 1.0):.0f}M"
         command = [str(program("lcm-logger")), "--quiet", "--lcm-url", self.url, "--channel", options.channels, quota]
+        command.append(f"--flush-interval={_FLUSH_MS}")
         if CONFIG_CHANNEL not in options.channels and options.channels != ".*":
             command[command.index(options.channels)] = f"({options.channels})|{CONFIG_CHANNEL}"
         if options.split_mb is not None:
@@ -102,7 +107,11 @@ class Recording:
         )
 
     def free_mb(self) -> float:
-        return shutil.disk_usage(self.output.resolve().parent).free / 1e6
+        """What the disk has left; 0 while the folder is gone."""
+        try:
+            return shutil.disk_usage(self.folder).free / 1e6
+        except FileNotFoundError:
+            return 0.0
 
     def publish_config(self) -> None:
         self._bus.publish(CONFIG_CHANNEL, encoded(self.config))
@@ -125,27 +134,30 @@ class Recording:
         return [path for path in [*self._finished, *current] if path.exists()]
 
     def keep_going(self) -> str | None:
-        """Pauses when the disk is nearly full and goes on when it is not; starts a logger anew that has ended.
+        """Pauses while the disk is nearly full or the folder is gone; starts a logger anew that ended or lost its file.
 
         Returns what happened, for people; nothing as long as all is as it was.
         """
-        free, keep = self.free_mb(), self._options.keep_free_mb
+        obstacle = self._obstacle()
         if self.paused:
-            if free < _ROOM_AGAIN * keep:
-                self._tell(health_t.FAULT, f"recording paused: the disk has less than {keep:.0f} MB left")
+            if obstacle is not None:
+                self._tell(health_t.FAULT, f"recording paused: {obstacle}")
                 return None
             self._begin_next_file()
             self.paused = False
             self._tell_that_it_goes_on()
-            return f"the disk has room again; recording goes on in {self.file(0)}"
-        if free < keep:
-            self._tell(health_t.FAULT, f"recording paused: the disk has less than {keep:.0f} MB left")
+            return f"there is room again; recording goes on in {self.file(0)}"
+        if obstacle is not None:
+            self._tell(health_t.FAULT, f"recording paused: {obstacle}")
             self._end_logger()
             # Whoever makes room by removing the file must get it.
             self.tail.close()
             self.paused = True
-            self.interruptions.append(f"the disk has less than {keep:.0f} MB left")
-            return f"{self.interruptions[-1]}: paused until there is room"
+            self.interruptions.append(obstacle)
+            return f"{obstacle}: paused until there is room"
+        if self.tail.is_lost():
+            self._end_logger()
+            return self._interrupted(f"{self.tail.path} was removed")
         if (code := self.logger.poll()) is None:
             self._tell_of_the_successor()
             return None
@@ -155,15 +167,27 @@ class Recording:
             return None
         return self._succeed_logger()
 
+    def _obstacle(self) -> str | None:
+        """Why nothing can be recorded now; a disk that was too full needs some room to spare."""
+        keep = self._options.keep_free_mb
+        if not self.folder.is_dir():
+            return f"the folder {self.folder} is gone"
+        if self.free_mb() < keep * (_ROOM_AGAIN if self.paused else 1.0):
+            return f"the disk has less than {keep:.0f} MB left"
+        return None
+
     def _succeed_logger(self) -> str:
         """The logger has ended on its own. When it was the first one and ended at once, it cannot work at all."""
         code = self.logger.returncode
         said = (self.logger.stderr.read() if self.logger.stderr else "").strip().splitlines()
         if not self.interruptions and time.monotonic() - self._started < _LEAST_LIFE_S:
             raise InputError(f"lcm-logger ended with code {code}: {(said or ['no message'])[-1]}")
-        self.interruptions.append(f"lcm-logger ended with code {code}")
+        return self._interrupted(f"lcm-logger ended with code {code}")
+
+    def _interrupted(self, why: str) -> str:
+        self.interruptions.append(why)
         self._begin_next_file()
-        return f"{self.interruptions[-1]}; recording goes on in {self.file(0)}"
+        return f"{why}; recording goes on in {self.file(0)}"
 
     def _begin_next_file(self) -> None:
         """FILE-2.lcmlog, FILE-3.lcmlog, ...: the next one that does not exist."""

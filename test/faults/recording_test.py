@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows L1 and P6 for the recorder: its disk fills in mid-drive, or its logger is killed; it goes on in a new file."""
+"""Rows L1 and P6 for the recorder: its disk fills, its folder or file is removed, or its logger is killed in mid-drive.
+
+It goes on in a new file.
+"""
 
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -23,9 +27,13 @@ from ignis.logs import read_events
 
 DISK_MB = 7
 KEEP_MB = 4
+SEED = 78
 BUSY_S = 1.5  # that a busy machine may add
 MESSAGE = bytes(20_000)
 STRANGER_MB = 20  # more than there is
+FAULT_WITHIN_S = RESUMED_WITHIN_S = 1.0
+KILLS = 4
+LOSS_S = 0.1  # that a killed logger may cost
 
 
 @pytest.fixture
@@ -133,6 +141,62 @@ def test_fault_l1_a_recorder_whose_disk_fills_says_so_and_goes_on_in_a_new_file_
     early, late = numbers(first), numbers(second)
     assert len(early) > 10 and len(late) > 10 and early[-1] < late[0], "what was written is whole, and it went on"
     assert not list(small_disk.glob("*.tmp"))
+
+
+def test_fault_l1_a_recorder_whose_folder_is_removed_says_so_and_goes_on_when_it_is_back(
+    private_network: None, tmp_path: Path
+) -> None:
+    folder = tmp_path / "card"
+    folder.mkdir()
+    log, second = folder / "drive.lcmlog", folder / "drive-2.lcmlog"
+    with Recorder(log) as recorder:
+        recorder.send_until(lambda: log.exists() and recorder.sent > 50)
+        shutil.rmtree(folder)
+        took = recorder.send_until(lambda: recorder.says(health_t.FAULT))
+        folder.mkdir()
+        resumed = recorder.send_until(second.exists)
+        recorder.send_until(lambda: recorder.says(health_t.OK) and second.stat().st_size > 1_500_000)
+        code, said = recorder.end()
+    print(f"FAULT after {took:.2f} s, went on after {resumed:.2f} s")
+    assert took < FAULT_WITHIN_S + BUSY_S and resumed < RESUMED_WITHIN_S + BUSY_S
+    assert code == 3 and f"the folder {folder} is gone: paused" in said
+    assert recorded_config(second) is not None and len(numbers(second)) > 10
+
+
+def test_fault_l1_a_recorder_whose_file_is_removed_goes_on_in_a_new_one(private_network: None, tmp_path: Path) -> None:
+    log, second = tmp_path / "drive.lcmlog", tmp_path / "drive-2.lcmlog"
+    with Recorder(log) as recorder:
+        recorder.send_until(lambda: log.exists() and recorder.sent > 50)
+        log.unlink()
+        took = recorder.send_until(second.exists)
+        recorder.send_until(lambda: second.stat().st_size > 1_500_000)
+        code, said = recorder.end()
+    assert took < RESUMED_WITHIN_S + BUSY_S
+    assert code == 3 and f"{log} was removed" in said
+    assert recorded_config(second) is not None and len(numbers(second)) > 10
+
+
+def test_fault_p6_a_killed_logger_costs_the_recording_at_most_a_tenth_of_a_second(
+    private_network: None, tmp_path: Path
+) -> None:
+    logs = [tmp_path / f"drive{part}.lcmlog" for part in ("", *(f"-{number}" for number in range(2, KILLS + 2)))]
+    generator = random.Random(SEED)
+    losses = []
+    with Recorder(logs[0]) as recorder:
+        for log in logs[:-1]:
+            recorder.send_until(log.exists)
+            # Small messages: large ones are written at once, since they fill the logger's buffer.
+            sent, end = [], time.monotonic() + generator.uniform(2.2, 2.6)
+            while time.monotonic() < end:
+                recorder.listener.bus.publish("SMALL", len(sent).to_bytes(4, "big"))
+                sent.append(time.monotonic())
+                time.sleep(0.004)
+            recorder.kill_logger()
+            kept = [int.from_bytes(event.data, "big") for event in read_events(log) if event.channel == "SMALL"]
+            losses.append(sent[-1] - sent[kept[-1]])
+        recorder.end()
+    print("seed", SEED, "lost [s]", [round(loss, 3) for loss in losses])
+    assert max(losses) < LOSS_S
 
 
 def test_fault_p6_a_killed_logger_is_succeeded_within_a_second_in_a_new_file(
