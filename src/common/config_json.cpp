@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/config_json.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <numeric>
+#include <ranges>
+#include <string_view>
 
 namespace ignis::config {
 namespace {
@@ -35,24 +38,39 @@ std::string readable(const std::string& text) {
   return result;
 }
 
+/// As the parser counts them in its own complaints: lines from 1, columns up to the last character that was read.
+std::string place_of(const std::string& text, const char* last) {
+  const std::string_view before(text.data(), last);
+  const auto line = 1 + std::ranges::count(before, '\n');
+  const std::size_t line_begin = before.rfind('\n') + 1;  // 0 in the first line
+  return std::format("line {}, column {}", line, before.size() - line_begin + 1);
+}
+
 }  // namespace
 
 Json parse_json(const std::string& text, const std::string& source) {
   std::vector<std::set<std::string>> open_objects;
   std::string fault;
+  const char* newest = text.data();  // that the parser has read
+  const auto refuse = [&](const std::string& reason) {
+    if (fault.empty()) fault = std::format("{}: {}", place_of(text, newest), reason);
+  };
   const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
-    if (depth > kMaxDepth && fault.empty()) fault = std::format("nesting deeper than {}", kMaxDepth);
+    if (depth > kMaxDepth) refuse(std::format("nesting deeper than {}", kMaxDepth));
     if (event == Json::parse_event_t::object_start) open_objects.emplace_back();
     if (event == Json::parse_event_t::object_end) open_objects.pop_back();
-    if (event == Json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second &&
-        fault.empty()) {
-      fault = std::format("the key \"{}\" stands twice", parsed.get<std::string>());
+    if (event == Json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second) {
+      refuse(std::format("the key \"{}\" stands twice", parsed.get<std::string>()));
     }
     return fault.empty();
   };
   Json json;
   try {
-    json = Json::parse(text, watch);
+    const auto noted = text | std::views::transform([&](const char& c) {
+                         newest = &c;
+                         return c;
+                       });
+    json = Json::parse(noted.begin(), noted.end(), watch);
   } catch (const Json::exception& error) {
     // What the callback refused is the cause; the parser's own complaint may only be its consequence.
     if (fault.empty()) fault = std::format("not valid JSON: {}", readable(error.what()));

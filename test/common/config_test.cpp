@@ -103,8 +103,11 @@ TEST(Config, RefusesTooManyListEntriesAndNamesTheBadOne) {
 }
 
 TEST(Config, RefusesDoubledKeysDeepNestingAndBrokenJson) {
-  EXPECT_NE(refusal(R"({"wheels": 4, "wheels": 5})").find("\"wheels\" stands twice"), std::string::npos);
-  EXPECT_NE(refusal(std::string(1000, '[')).find("nesting"), std::string::npos);
+  EXPECT_NE(refusal(R"({"wheels": 4, "wheels": 5})").find("line 1, column 22: the key \"wheels\" stands twice"),
+            std::string::npos);
+  EXPECT_NE(refusal("{\n  \"wheels\": 4,\n\n  \"wheels\": 5}").find("line 4, column 10: the key"), std::string::npos);
+  EXPECT_NE(refusal(std::string(1000, '[')).find("line 1, column 18: nesting"), std::string::npos);
+  EXPECT_NE(refusal("\n" + std::string(1000, '[')).find("line 2, column 18: nesting"), std::string::npos);
   EXPECT_NE(refusal("{\n  \"wheels\": ,\n}").find("line 2"), std::string::npos);
   EXPECT_NE(refusal("[1]").find("must be an object"), std::string::npos);
   EXPECT_NE(refusal(R"({"speed": NaN})"), "");

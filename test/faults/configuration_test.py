@@ -120,10 +120,10 @@ def test_fault_c3_every_number_one_step_outside_its_range_is_refused(
     [
         (b"", "not valid JSON"),
         (b'{"frontend": {"iterations": 3,}}', "line 1, column"),
-        (b'{"map": {"local_cell_m": 1},\n "map": {}}', "map"),
+        (b'{"map": {"local_cell_m": 1},\n "map": {}}', 'line 2, column 6: the key "map" stands twice'),
         (b'{"frontend": {"voxel_size_m": NaN}}', "not valid JSON"),
         (b"\xff\xfe{}", "not valid JSON"),
-        (b"[" * 100_000, ""),
+        (b"[" * 100_000, "line 1, column 18: nesting deeper than 16"),
     ],
 )
 def test_fault_c1_a_broken_file_is_refused_with_place_and_reason(
