@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "messages/lcm_log.h"
 
+#include <algorithm>
 #include <fstream>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <unistd.h>
@@ -15,6 +17,16 @@
 namespace ignis::messages {
 namespace {
 
+/// What stands in a record.
+struct Record {
+  std::int64_t number = 0;
+  std::int64_t log_utime = 0;
+  std::string channel;
+  std::vector<unsigned char> data;
+
+  bool operator==(const Record&) const = default;
+};
+
 class LcmLogTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -23,15 +35,40 @@ class LcmLogTest : public testing::Test {
     lcm::LogFile writer(file_.string(), "w");
     ASSERT_TRUE(writer.good());
     for (int i = 0; i < kRecords; ++i) {
-      std::vector<unsigned char> data(static_cast<std::size_t>(20 + i), static_cast<unsigned char>(i));
+      Record record = written(i);
       lcm::LogEvent event;
-      event.eventnum = i;
-      event.timestamp = 1'000 * i;
-      event.channel = i % 2 == 0 ? "EVEN" : "ODD";
-      event.datalen = static_cast<int>(data.size());
-      event.data = data.data();
+      event.eventnum = record.number;
+      event.timestamp = record.log_utime;
+      event.channel = record.channel;
+      event.datalen = static_cast<int>(record.data.size());
+      event.data = record.data.data();
       ASSERT_EQ(writer.writeEvent(&event), 0);
     }
+  }
+
+  /// The record of this number, and how long it is in the file [bytes].
+  [[nodiscard]] static Record written(int i) {
+    return {.number = i,
+            .log_utime = 1'000 * i,
+            .channel = i % 2 == 0 ? "EVEN" : "ODD",
+            .data = std::vector<unsigned char>(static_cast<std::size_t>(20 + i), static_cast<unsigned char>(i))};
+  }
+  [[nodiscard]] static std::size_t size_of(const Record& record) {
+    return 28 + record.channel.size() + record.data.size();
+  }
+
+  [[nodiscard]] std::vector<Record> read(std::int64_t& damaged) const {
+    LcmLog log(file_);
+    std::vector<Record> records;
+    while (const std::optional<LogEvent> event = log.next()) {
+      const auto* begin = reinterpret_cast<const unsigned char*>(event->data.data());
+      records.push_back({.number = event->number,
+                         .log_utime = event->log_utime,
+                         .channel = std::string(event->channel),
+                         .data = {begin, begin + event->data.size()}});
+    }
+    damaged = log.damaged_bytes();
+    return records;
   }
 
   void TearDown() override { std::filesystem::remove_all(folder_); }
@@ -43,14 +80,6 @@ class LcmLogTest : public testing::Test {
   void write(const std::vector<char>& content) const {
     std::ofstream(file_, std::ios::binary).write(content.data(), std::ssize(content));
   }
-  [[nodiscard]] int count_records(std::int64_t* damaged = nullptr) const {
-    LcmLog log(file_);
-    int records = 0;
-    while (log.next()) ++records;
-    if (damaged != nullptr) *damaged = log.damaged_bytes();
-    return records;
-  }
-
   static constexpr int kRecords = 40;
   std::filesystem::path folder_ = test::fresh_folder();
   std::filesystem::path file_;
@@ -102,15 +131,20 @@ TEST_F(LcmLogTest, ReadsWhatLcmWrote) {
 }
 
 TEST_F(LcmLogTest, ReadsEveryWholeRecordWhereverTheLogIsCut) {
-  const std::vector<char> whole = bytes();
-  for (std::size_t size = 60; size < whole.size(); size += 7) {
-    write({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
+  std::vector<Record> expected;
+  for (int i = 0; i < kRecords; ++i) expected.push_back(written(i));
+  std::size_t whole_bytes = bytes().size();
+  for (std::size_t size = whole_bytes; size >= size_of(written(0)); --size) {
+    if (size < whole_bytes) {
+      whole_bytes -= size_of(expected.back());
+      expected.pop_back();
+    }
+    std::filesystem::resize_file(file_, size);
     std::int64_t damaged = 0;
-    const int records = count_records(&damaged);
-    std::size_t expected_bytes = 0;
-    for (int i = 0; i < records; ++i) expected_bytes += 28 + (i % 2 == 0 ? 4 : 3) + static_cast<std::size_t>(20 + i);
-    EXPECT_EQ(static_cast<std::int64_t>(size - expected_bytes), damaged) << "cut at " << size;
+    ASSERT_EQ(read(damaged), expected) << "cut at " << size;
+    ASSERT_EQ(damaged, static_cast<std::int64_t>(size - whole_bytes)) << "cut at " << size;
   }
+  EXPECT_EQ(std::ssize(expected), 1);
 }
 
 TEST_F(LcmLogTest, LosesOnlyTheRecordThatWasTouched) {
@@ -121,7 +155,18 @@ TEST_F(LcmLogTest, LosesOnlyTheRecordThatWasTouched) {
     const std::size_t at = 60 + random() % (whole.size() - 60);
     altered[at] = static_cast<char>(altered[at] ^ static_cast<char>(1U << (random() % 8U)));
     write(altered);
-    EXPECT_GE(count_records(), kRecords - 1) << "altered byte " << at;
+    std::vector<Record> others;
+    for (std::size_t begin = 0, i = 0; begin < whole.size(); ++i) {
+      const Record record = written(static_cast<int>(i));
+      const std::size_t end = begin + size_of(record);
+      if (at < begin || at >= end) others.push_back(record);
+      begin = end;
+    }
+    std::int64_t damaged = 0;
+    std::vector<Record> found = read(damaged);
+    EXPECT_LE(found.size(), kRecords) << "altered byte " << at;
+    std::erase_if(found, [&](const Record& record) { return !std::ranges::contains(others, record); });
+    EXPECT_EQ(found, others) << "altered byte " << at;
   }
 }
 
@@ -131,7 +176,9 @@ TEST_F(LcmLogTest, NeverTrustsAnAnnouncedLength) {
   altered[25] = altered[26] = altered[27] = static_cast<char>(0xff);
   write(altered);
   std::int64_t damaged = 0;
-  EXPECT_EQ(count_records(&damaged), kRecords - 1);
+  const std::vector<Record> found = read(damaged);
+  EXPECT_EQ(std::ssize(found), kRecords - 1);
+  EXPECT_EQ(found.front(), written(1));
   EXPECT_EQ(damaged, 28 + 4 + 20);
 }
 
