@@ -64,6 +64,7 @@ class FaultRun:
         folder: Path,
         names: tuple[str, ...] = ("map_builder", "graph_backend", "lio_frontend"),
         map_options: tuple[str | Path, ...] = (),
+        frontend_options: tuple[str | Path, ...] = (),
     ) -> None:
         self.seen = Seen()
         self.killed: set[str] = set()  # and not yet started again
@@ -71,7 +72,7 @@ class FaultRun:
         self.pipeline = Pipeline(folder, BUS)
         self.bus = open_bus(BUS)
         self._names = names
-        self._map_options = ("--port", PORT, *map_options)
+        self._options = {"map_builder": ("--port", PORT, *map_options), "lio_frontend": frontend_options}
         for channel, take in {
             "LIO_KEYFRAME": self._on_keyframe,
             "SMOOTHED_KEYFRAMES": self._on_revision,
@@ -93,7 +94,7 @@ class FaultRun:
         return self
 
     def _start(self, name: str) -> None:
-        self.pipeline.start(name, "--config", CONFIG, *(self._map_options if name == "map_builder" else ()))
+        self.pipeline.start(name, "--config", CONFIG, *self._options.get(name, ()))
 
     def kill_and_restart(self, name: str) -> None:
         """Kills a process and starts it again at once."""

@@ -85,7 +85,8 @@ def address_space(pid: int) -> int:
 def test_fault_p8_without_memory_in_mid_drive_a_process_ends_with_a_message(
     drive_log: Path, private_network: None, tmp_path: Path
 ) -> None:
-    run = FaultRun(tmp_path)
+    checkpoint = tmp_path / "checkpoint"
+    run = FaultRun(tmp_path, frontend_options=("--checkpoint", checkpoint))
     with run:
         limited: dict[str, subprocess.Popen] = {}
         player = run.pipeline.start("lcm-logplayer", "--speed=2", "--regexp=L1_(IMU|SCAN)", drive_log)
@@ -104,6 +105,14 @@ def test_fault_p8_without_memory_in_mid_drive_a_process_ends_with_a_message(
             # What it has set aside may last; then nothing has gone wrong.
             assert process.poll() is None or (process.poll() == 1 and "alloc" in said), (name, process.poll(), said)
         assert any(process.poll() is not None for process in limited.values()), "the limit must bite"
+        # The front end writes files all the time: what stands there is whole, and a successor goes on with it.
+        assert list(checkpoint.glob("keyframe_*"))
+        run.killed.update(limited)
+        run.kill_and_restart("lio_frontend")
+        run.listen(2.0)
+        newest = run.seen.health["lio_frontend"][-1]
+        assert newest.pid == run.pipeline.processes["lio_frontend"].pid and "resumed" in newest.state_text
+    assert not list(tmp_path.rglob("*.tmp"))
 
 
 def test_fault_b3_a_receiver_frozen_for_two_seconds_loses_nothing(
