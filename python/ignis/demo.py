@@ -23,7 +23,7 @@ from ignis import results
 from ignis.bus import open_bus
 from ignis.compare import comparison, table
 from ignis.errors import EXIT_FAILURE, InputError, run_command
-from ignis.files import write_text
+from ignis.files import put_in_place, write_text
 from ignis.log_config import CONFIG_CHANNEL, encoded
 from ignis.pipeline import Pipeline, ProcessDied, binary, effective_config, enter_private_network
 from ignis.progress import Progress
@@ -190,7 +190,7 @@ class _News:
 
 
 def _keep_log(folder: Path) -> None:
-    (folder / f"{LOG_NAME}.tmp").rename(folder / LOG_NAME)
+    put_in_place(folder / f"{LOG_NAME}.tmp", folder / LOG_NAME)
 
 
 def _report(summary: dict[str, Any], compared: dict[str, Any]) -> str:

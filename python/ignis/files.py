@@ -25,6 +25,13 @@ def _wait_for_disk(path: Path) -> None:
         os.close(descriptor)
 
 
+def put_in_place(temporary: Path, path: Path) -> None:
+    """Gives a complete file its name. Unsynced, a power cut may leave the name without its content and no old file."""
+    _wait_for_disk(temporary)
+    temporary.replace(path)
+    _wait_for_disk(path.parent)
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yields a temporary path beside `path`; syncs and renames it when the block ends well, else removes it."""
@@ -36,10 +43,7 @@ def replacing(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f"{path.name}.{os.getpid()}-{next(_numbers)}.tmp")
     try:
         yield temporary
-        # Without, a power cut may leave the new name without its content, and the old file gone.
-        _wait_for_disk(temporary)
-        temporary.replace(path)
-        _wait_for_disk(path.parent)
+        put_in_place(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
 

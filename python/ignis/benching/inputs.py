@@ -15,6 +15,7 @@ from ignis.benching.peer_runner import REST_S
 from ignis.comparing.estimates import read_in_our_axes
 from ignis.errors import InputError
 from ignis.evaluation.drives import simulate
+from ignis.files import put_in_place
 from ignis.importers.recorder import IMU_CHANNEL, SCAN_CHANNEL, TRUTH_CHANNEL
 from ignis.importing import ImportChoice, detect, import_recording
 from ignis.logs import PartAssembler, joined_arrays, read_log
@@ -123,5 +124,5 @@ def _write_arrays(log: Path, arrays: Path) -> float:
         gyro=np.array(gyro) @ to_flu,
         accel=np.array(accel) @ to_flu,
     )
-    temporary.rename(arrays)
+    put_in_place(temporary, arrays)
     return float(np.median(np.diff(first)))

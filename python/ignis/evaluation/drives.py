@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ignis.errors import InputError, run_quietly
-from ignis.files import write_text
+from ignis.files import put_in_place, write_text
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def simulate(l1_sim: Path, scene: Path, seed: int, config: Path, log: Path, trut
     partial = truth.with_suffix(".partial")
     command = [l1_sim, "--scene", scene, "--seed", seed, "--config", config]
     run_quietly([*command, "--log", log, "--ground-truth", partial])
-    partial.rename(truth)
+    put_in_place(partial, truth)
 
 
 def simulated(l1_sim: Path, scene: Path, seed: int, config: Path, changes: list[str], folder: Path) -> Simulation:
