@@ -9,6 +9,7 @@
 #include "map/map_export.h"
 #include "replay_figures.h"
 #include "replay_verdict.h"
+#include "runtime/version.h"
 
 namespace ignis {
 namespace {

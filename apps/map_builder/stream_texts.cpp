@@ -8,7 +8,7 @@
 
 #include "map/stream_encoding.h"
 #include "map/voxel_checksum.h"
-#include "runtime/application.h"
+#include "runtime/version.h"
 
 namespace ignis {
 namespace {

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "runtime/stop_signal.h"
+#include "runtime/version.h"
 
 namespace ignis::runtime {
 namespace {
@@ -24,7 +25,7 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
   app.add_option("--lcm-url", options.lcm_url, "LCM URL (default: LCM_DEFAULT_URL, then lcm.url of the configuration)");
   app.add_flag("--print-config", options.print_config, "print the effective configuration and end");
   app.add_flag("--print-schema", options.print_schema, "print the JSON schema of the configuration and end");
-  app.set_version_flag("--version", version());
+  app.set_version_flag("--version", build());
 }
 
 IgnisConfig effective_config(const CommonOptions& options) {
@@ -38,8 +39,6 @@ IgnisConfig effective_config(const CommonOptions& options) {
 }
 
 }  // namespace
-
-std::string version() { return IGNIS_VERSION; }
 
 int run_application(const std::string& name, const std::string& description, int argc, char** argv,
                     const std::function<void(CLI::App&)>& add_options,

@@ -39,7 +39,4 @@ int run_application(const std::string& name, const std::string& description, int
                     const std::function<void(CLI::App&)>& add_options,
                     const std::function<ExitCode(const Application&)>& body);
 
-/// Version of this build.
-[[nodiscard]] std::string version();
-
 }  // namespace ignis::runtime

@@ -11,6 +11,7 @@
 
 #include "runtime/channels.h"
 #include "runtime/process_usage.h"
+#include "runtime/version.h"
 
 namespace ignis::runtime {
 namespace {
@@ -38,7 +39,7 @@ std::string remedy(const std::string& url) {
 LcmLink::LcmLink(const Application& application)
     : identity_{.process = application.name,
                 .pid = getpid(),
-                .version = version(),
+                .version = build(),
                 .config_hash = application.config_hash},
       url_(application.config.lcm.url),
       alone_(application.name, url_),

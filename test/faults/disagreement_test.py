@@ -3,6 +3,7 @@
 
 import os
 import random
+import re
 import select
 import shutil
 import signal
@@ -13,7 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fault_drive import BUS, CONFIG
+from vehicle_peers import health
+
+from fault_drive import BUS, CHECKOUT, CONFIG
 from ignis.bus import Listener
 from ignis.pipeline import Pipeline, binary
 from ignis.supervision import PAUSE, S6Supervisor
@@ -22,6 +25,7 @@ from ignis.supervision import PAUSE, S6Supervisor
 PAIR = ("lio_frontend", "graph_backend")
 FAULT_WITHIN_S = 2.0
 BUSY_S = 1.5  # that a busy machine may add
+SCRIPT = Path("cmake") / "BuildId.cmake"
 STARTS = 5
 LOOP_S = 10.0
 STOPS = 400
@@ -80,6 +84,55 @@ def test_fault_c4_processes_that_disagree_are_a_fault_within_two_seconds_and_kee
         after = bus.health("lio_frontend")
     assert took < FAULT_WITHIN_S + BUSY_S
     assert after.config_hash == before.config_hash != bus.health("graph_backend").config_hash
+
+
+def test_fault_c4_two_builds_of_one_release_are_a_fault_within_two_seconds(
+    private_network: None, tmp_path: Path
+) -> None:
+    with Pipeline(tmp_path, BUS) as pipeline:
+        bus = Bus(pipeline)
+        pipeline.start("lio_frontend", "--config", CONFIG)
+        bus.wait(lambda: bus.health("lio_frontend") is not None)
+        ours = bus.health("lio_frontend")
+        bus.listener.listen(1.5)
+        assert not bus.is_fault("lio_frontend", "version")
+        release, _, sources = ours.version.partition("+")
+        assert sources, "a release alone does not tell two builds of it apart"
+        other = health("graph_backend", config_hash=ours.config_hash, version=f"{release}+000000000000")
+        began = time.monotonic()
+        while not bus.is_fault("lio_frontend", f"version {ours.version} differs from {other.version} of graph_backend"):
+            assert time.monotonic() - began < FAULT_WITHIN_S + BUSY_S
+            bus.listener.bus.publish("HEALTH", other.encode())
+            bus.listener.listen(0.2)
+
+
+def run_script(source: Path, header: Path) -> str:
+    """What a build of these sources is called."""
+    command = ["cmake", f"-DSOURCE={source}", f"-DHEADER={header}", "-DVERSION=1.2.3", "-P", CHECKOUT / SCRIPT]
+    subprocess.run(command, check=True)
+    return header.read_text().split('"')[1]
+
+
+def test_fault_c4_a_build_is_called_by_its_sources_with_or_without_git(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for tree in (first, second):
+        for folder in ("apps", "cmake", "lcmtypes", "src"):
+            shutil.copytree(CHECKOUT / folder, tree / folder, ignore=shutil.ignore_patterns("node_modules"))
+        shutil.copy(CHECKOUT / "CMakeLists.txt", tree)
+    header = tmp_path / "build_id.h"
+    name = run_script(first, header)
+    assert re.fullmatch(r"1\.2\.3\+[0-9a-f]{12}", name)
+    written = header.stat().st_mtime_ns
+    assert run_script(second, header) == name, "wherever they stand"
+    assert header.stat().st_mtime_ns == written, "nothing is compiled anew"
+    # No program is made of what tests and editors leave behind.
+    (second / "src" / "notes.txt~").write_text("mine")
+    assert run_script(second, header) == name
+    source = second / "src" / "common" / "pose.cpp"
+    source.write_bytes(source.read_bytes() + b"\n")
+    assert run_script(second, header) != name
+    source.unlink()
+    assert run_script(second, header) not in (name, run_script(first, header))
 
 
 def test_fault_b7_a_second_instance_of_any_process_refuses_to_start_and_the_first_goes_on(
