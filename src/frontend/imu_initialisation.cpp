@@ -89,7 +89,7 @@ std::optional<FilterState> ImuInitialisation::add(const ImuSample& sample) {
 
   const Window window = summarise();
   const bool at_rest = config_.start == "at_rest";
-  const std::string reason = at_rest ? refusal(window) : scale_refusal(window.accel_mean.norm());
+  const std::string reason = at_rest ? refusal(window) : refusal_in_motion(window);
   if (!reason.empty()) {
     report_ = "start refused, waiting: " + reason;
     return std::nullopt;
@@ -136,20 +136,41 @@ ImuInitialisation::Window ImuInitialisation::summarise() const {
   return window;
 }
 
-std::string ImuInitialisation::scale_refusal(double norm) const {
+std::string ImuInitialisation::scale_refusal(const Window& window) const {
+  const double norm = window.accel_mean.norm();
   if (norm > 0.9 && norm < 1.1) {
-    return std::format("mean specific force is {:.3f}: this looks like g instead of m/s^2", norm);
+    return std::format("mean specific force is {:.3f} +- {:.3f}: this looks like g instead of m/s^2", norm,
+                       window.accel_sigma);
   }
   const double band = config_.start == "at_rest" ? config_.rest_accel_band : 3.0 * config_.moving_accel_sigma;
   if (std::abs(norm - config_.gravity_m) > band) {
-    return std::format("mean specific force is {:.2f} m/s^2, not {:.2f} +- {:.2f}: scale, saturation, or motion", norm,
-                       config_.gravity_m, band);
+    return std::format(
+        "mean specific force is {:.2f} m/s^2 (spread {:.2f}), not {:.2f} +- {:.2f}: scale, saturation, or motion", norm,
+        window.accel_sigma, config_.gravity_m, band);
   }
   return "";
 }
 
+std::string ImuInitialisation::tilt_refusal(const Window& window, double limit) const {
+  const Eigen::Vector3d& force = window.accel_mean;
+  const double tilt = std::acos(std::clamp(force.normalized().dot(frames::up()), -1.0, 1.0));
+  if (tilt <= limit) return "";
+  return std::format(
+      "gravity is {:.0f} degrees away from the body's up axis (limit {:.0f}), specific force ({:.2f}, {:.2f}, {:.2f}) +- "
+      "{:.2f} m/s^2: axes swapped or negated?",
+      tilt * kDegrees, limit * kDegrees, force.x(), force.y(), force.z(), window.accel_sigma);
+}
+
+/// What a vehicle in motion accelerates by looks like a tilt.
+std::string ImuInitialisation::refusal_in_motion(const Window& window) const {
+  std::string scale = scale_refusal(window);
+  if (!scale.empty()) return scale;
+  const double hidden = std::asin(std::min(3.0 * config_.moving_accel_sigma / config_.gravity_m, 1.0));
+  return tilt_refusal(window, config_.max_start_tilt_rad + hidden);
+}
+
 std::string ImuInitialisation::refusal(const Window& window) const {
-  std::string scale = scale_refusal(window.accel_mean.norm());
+  std::string scale = scale_refusal(window);
   if (!scale.empty()) return scale;
   const bool accel_quiet = window.accel_sigma <= config_.rest_accel_sigma;
   const double gyro = window.gyro_mean.norm();
@@ -176,13 +197,7 @@ std::string ImuInitialisation::refusal(const Window& window) const {
     return std::format("moving: specific force changed by {:.2f} m/s^2, turn rate by {:.3f} rad/s within {:.1f} s",
                        window.accel_drift, window.gyro_drift, window.seconds);
   }
-  const double tilt = std::acos(std::clamp(window.accel_mean.normalized().dot(frames::up()), -1.0, 1.0));
-  if (tilt > config_.max_start_tilt_rad) {
-    return std::format(
-        "gravity is {:.0f} degrees away from the body's up axis (limit {:.0f}): axes swapped or negated?",
-        tilt * kDegrees, config_.max_start_tilt_rad * kDegrees);
-  }
-  return "";
+  return tilt_refusal(window, config_.max_start_tilt_rad);
 }
 
 FilterState ImuInitialisation::first_state(const Window& window, bool at_rest) const {

@@ -51,7 +51,9 @@ class ImuInitialisation {
   [[nodiscard]] Window summarise() const;
   /// Empty when the window is at rest; otherwise the reason that it is not.
   [[nodiscard]] std::string refusal(const Window& window) const;
-  [[nodiscard]] std::string scale_refusal(double norm) const;
+  [[nodiscard]] std::string refusal_in_motion(const Window& window) const;
+  [[nodiscard]] std::string scale_refusal(const Window& window) const;
+  [[nodiscard]] std::string tilt_refusal(const Window& window, double limit) const;
   [[nodiscard]] FilterState first_state(const Window& window, bool at_rest) const;
   [[nodiscard]] std::string success(const Window& window, const FilterState& state, bool at_rest) const;
 

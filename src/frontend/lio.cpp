@@ -195,9 +195,11 @@ bool Lio::comes_too_soon(const Scan& scan) const {
   return overlaps || scan.end_utime() - *last_scan_end_ < kMinScanPeriodUs;
 }
 
+bool Lio::is_deskewed(const Scan& scan) const { return config_.deskew && carries_times(scan); }
+
 std::vector<CloudPoint> Lio::register_points(const Scan& scan) {
   std::vector<CloudPoint> cloud;
-  if (config_.deskew) {
+  if (is_deskewed(scan)) {
     deskewer_.deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m, cloud);
     return cloud;
   }
@@ -221,10 +223,11 @@ ScanResult Lio::process(const Scan& scan) {
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
   std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
-  const double age = config_.deskew ? mean_age(selection.scan) : 0.0;
+  const double age = is_deskewed(selection.scan) ? mean_age(selection.scan) : 0.0;
   const double seen_age = age * new_share(filter_.covariance, mapped_velocity_variance_);
   MatchResult match = correct(cloud, sparse, seen_age);
   match.stats.points = selection.in_range;
+  match.stats.untimed = !carries_times(selection.scan);
   filter_ = match.filter;
   if (learns_nothing()) keep_biases(predicted);
   count_correction(predicted, match, seen_age);

@@ -14,6 +14,12 @@ double mean_age(const Scan& scan) {
   return sum / static_cast<double>(scan.points.size());
 }
 
+bool carries_times(const Scan& scan) {
+  if (scan.points.empty() || scan.duration_us == 0) return true;
+  const auto differs = [&](const ScanPoint& point) { return point.dt_us != scan.points.front().dt_us; };
+  return std::ranges::any_of(scan.points, differs);
+}
+
 double unseen_turn_variance(double gyro_noise, double seconds) { return gyro_noise * gyro_noise * seconds / 3.0; }
 
 double velocity_variance(const ErrorCovariance& covariance) {

@@ -15,6 +15,9 @@ namespace ignis {
 /// Seconds from the mean instant of a scan's points to its end; zero for a scan without points.
 [[nodiscard]] double mean_age(const Scan& scan);
 
+/// Whether its points say when they were measured: not when a scan that lasts has all of them at one instant.
+[[nodiscard]] bool carries_times(const Scan& scan);
+
 /// Variance [rad^2], per axis, of the turn that the gyro's noise adds between the instants of a scan's points, in their
 /// mean, and its end. The points are carried to the end by that turn, so scan matching does not see it: the attitude
 /// that it finds is that of the mean instant, as the gyro has carried it on. New in each scan, so a map, which is a

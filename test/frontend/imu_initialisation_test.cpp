@@ -96,6 +96,25 @@ TEST(ImuInitialisation, SaysAxesWhenGravityPointsElsewhere) {
   EXPECT_NE(refusal([](ImuSample& s, double) { std::swap(s.accel.x(), s.accel.y()); }).find("axes"), std::string::npos);
 }
 
+TEST(ImuInitialisation, SaysAxesInMotionToo) {
+  FrontendConfig config;
+  config.start = "moving";
+  const Distortion negated = [](ImuSample& s, double) { s.accel = -s.accel; };
+  const Distortion swapped = [](ImuSample& s, double) { std::swap(s.accel.x(), s.accel.y()); };
+  for (const Distortion& wrong : {negated, swapped}) {
+    ImuInitialisation initialisation(config);
+    EXPECT_FALSE(feed(initialisation, 2.0, wrong).has_value()) << "the map would hang upside down, or on its side";
+    EXPECT_TRUE(initialisation.report().contains("axes")) << initialisation.report();
+  }
+}
+
+TEST(ImuInitialisation, SaysWhatItMeasuredAndHowMuchThatSpreads) {
+  EXPECT_TRUE(refusal([](ImuSample& s, double) { s.accel /= 9.81; }).contains("is 1.0")) << "0.1 are noise";
+  EXPECT_TRUE(refusal([](ImuSample& s, double) { s.accel.setZero(); }).contains("is 0.00 m/s^2 (spread 0.00)"));
+  const std::string axes = refusal([](ImuSample& s, double) { s.accel = -s.accel; });
+  EXPECT_TRUE(axes.contains("specific force (") && axes.contains(") +- 0.9")) << axes;
+}
+
 TEST(ImuInitialisation, RefusesATurningVehicle) {
   EXPECT_NE(refusal([](ImuSample& s, double) { s.gyro.y() += 0.15; }).find("turning"), std::string::npos);
 }

@@ -312,6 +312,19 @@ TEST(Fault_F8, PointTimesThatAreUnsortedOrOutsideTheScanAreClamped) {
   EXPECT_LT(run.error_at_end(), 0.2);
 }
 
+TEST(Fault_F8, AScanWithoutPointTimesIsTakenAsItIsAndSaysSo) {
+  Drive input = drive();
+  for (std::size_t i = 100; i < input.scans.size(); ++i) {
+    for (ScanPoint& point : input.scans[i].points) point.dt_us = 0;
+  }
+  const Watched run(input);
+  const ScanStats& stats = run.scans.back().stats;
+  EXPECT_TRUE(stats.applied());
+  EXPECT_NE(explanation(stats).find("not deskewed, its points carry no times"), std::string::npos);
+  EXPECT_EQ(explanation(run.scans[90].stats).find("deskewed"), std::string::npos) << "these had some";
+  EXPECT_LT(run.error_at_end(), 0.2);
+}
+
 TEST(Fault_F9, AStampOfTheFarFutureBlocksNothing) {
   Drive input = drive();
   ImuSample future = *sample_at(input, 8.0);
