@@ -14,8 +14,8 @@ struct LinkReport {
   std::string trouble = {};         ///< of the recording; empty: none
 };
 
-/// The first clock epoch of a live driver: its start [ms]. No two restarts of the sensor's counters are nearer to each
-/// other than that, so what follows a killed driver repeats none of its epochs.
+/// The first clock epoch of a live driver: its start [ms]. The sensor's counters start anew far less often than that
+/// counts, so the successor of a killed driver repeats none of its epochs.
 [[nodiscard]] std::int32_t epoch_of_start();
 
 /// Puts what the decoder gives on the bus: L1_IMU, L1_SCAN, and once a second L1_STATUS and HEALTH.

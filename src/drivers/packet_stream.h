@@ -66,8 +66,8 @@ struct Housekeeping {
 
 /// Signs of a sick sensor behind valid frames.
 struct SensorHealth {
-  int rejected_in_a_row = 0;  ///< frames with absurd content since the last good one of their type; the worst type
-  std::string rejected_field = {};  ///< the field of it that was refused last
+  int rejected_in_a_row = 0;        ///< frames of one message with absurd content since its last good one: the most
+  std::string rejected_field = {};  ///< the field of that message that was refused last
   int equal_gyro_samples = 0;       ///< inertial samples in a row with the turn rates of the one before
   int equal_accel_samples = 0;
 };
