@@ -22,7 +22,7 @@ PROCESSES = ("lio_frontend", "graph_backend", "map_builder", "l1_driver")
 SEED = 77
 STOPS = 6
 STOP_WITHIN_S = 2.0
-LOST_AT_S, BACK_AT_S = 2.0, 3.4  # the multicast route; a drive that is silent for three seconds begins anew
+LOST_AT_S, BACK_AT_S = 2.0, 4.2  # the multicast route; a drive that is silent for three seconds begins anew
 FAULT_WITHIN_S = RESUMED_WITHIN_S = 1.0
 BUSY_S = 0.5  # that a busy machine may add
 MUTE = "nothing can be sent to the bus"
@@ -189,7 +189,7 @@ def test_fault_b7_a_route_lost_in_mid_drive_is_a_fault_within_a_second_and_its_r
         with run:
             lost = LostRoute(run, names, supervisor)
             try:
-                run.play(drive_log, lost.look)
+                run.play(drive_log, lost.look, speed=1.0)
             finally:
                 lost.give_back()
     print({what: round(when - lost.at["lost"], 2) for what, when in lost.at.items()})
