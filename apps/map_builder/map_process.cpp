@@ -33,7 +33,7 @@ std::string given_up_text(std::int64_t keyframes) {
 /// Empty while nothing was dropped.
 std::string drops_text(std::int64_t clouds) {
   if (clouds == 0) return {};
-  return std::format("map.max_keyframe_points is reached, the {} farthest keyframe clouds are dropped", clouds);
+  return std::format("; map.max_keyframe_points is reached, the {} farthest keyframe clouds are dropped", clouds);
 }
 
 std::string refusal_text(const HudData& hud) {
@@ -56,7 +56,8 @@ MapProcess::MapProcess(const runtime::Application& application, const runtime::H
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / hmi.frame_rate_hz))),
       refusals_(kRefusalTold),
       other_sessions_(kRefusalTold),
-      given_up_(kLossTold) {
+      given_up_(kLossTold),
+      drops_(kLossTold) {
   hud_.map.address = server_.address();
   hud_.band_radii = {map_config_.local_window_m, map_config_.mid_window_m, map_config_.coarse_window_m};
   subscribe(application.config.lcm);
@@ -335,10 +336,9 @@ std::string MapProcess::trouble() {
   const bool session_trouble = other_sessions_.look(hud_.refused_of_other_sessions, now);
   const bool refusal = refusals_.look(hud_.refused_clouds + hud_.refused_poses + hud_.refused_points, now);
   const bool loss = given_up_.look(hud_.keyframes_given_up, now);
-  const std::string drops = drops_text(map_.clouds().dropped());
-  if (map_.voxels().coarsening() > 0) {
-    return "map.max_voxels is reached, the finest level is left out" + (drops.empty() ? "" : "; " + drops);
-  }
+  // A long drive drops clouds by and by: that it begins to is news, what follows stands beside OK.
+  const bool first_drop = drops_.look(std::min<std::int64_t>(map_.clouds().dropped(), 1), now);
+  if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
   if (std::string failure = lasting_.failure(); !failure.empty()) return failure;
   if (std::string missing = missed_.trouble(now_s()); !missing.empty()) return missing;
   if (!journal_damage_.empty() && now_s() - journal_damage_s_ < MissedScans::kTold_s) return journal_damage_;
@@ -348,14 +348,14 @@ std::string MapProcess::trouble() {
   }
   if (refusal) return refusal_text(hud_);
   if (loss) return given_up_text(hud_.keyframes_given_up);
-  return drops;  // for the rest of the drive, so behind all that is news
+  return first_drop ? "a bound of memory is reached" : "";
 }
 
 void MapProcess::report() {
   update_status();
   const std::string why = trouble();
   const std::int8_t state = why.empty() ? health_t::OK : health_t::DEGRADED;
-  hud_.health = why.empty() ? "OK" : "DEGRADED: " + why;
+  hud_.health = (why.empty() ? "OK" : "DEGRADED: " + why) + drops_text(map_.clouds().dropped());
   ViewUpdate update;
   update.api_status = shared(status_json(hud_, budget_, server_.counters(), pictures_, loops_.text()));
   server_.publish(std::move(update));

@@ -110,6 +110,7 @@ class MapProcess {
   runtime::RecentRise refusals_;
   runtime::RecentRise other_sessions_;
   runtime::RecentRise given_up_;
+  runtime::RecentRise drops_;
   std::int64_t given_up_told_ = 0;  // in the log, whenever it has doubled
   std::int32_t graph_keyframes_ = 0;
   KeyframeRequests keyframe_requests_;

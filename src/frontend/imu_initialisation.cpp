@@ -156,7 +156,8 @@ std::string ImuInitialisation::tilt_refusal(const Window& window, double limit) 
   const double tilt = std::acos(std::clamp(force.normalized().dot(frames::up()), -1.0, 1.0));
   if (tilt <= limit) return "";
   return std::format(
-      "gravity is {:.0f} degrees away from the body's up axis (limit {:.0f}), specific force ({:.2f}, {:.2f}, {:.2f}) +- "
+      "gravity is {:.0f} degrees away from the body's up axis (limit {:.0f}), specific force ({:.2f}, {:.2f}, {:.2f}) "
+      "+- "
       "{:.2f} m/s^2: axes swapped or negated?",
       tilt * kDegrees, limit * kDegrees, force.x(), force.y(), force.z(), window.accel_sigma);
 }
