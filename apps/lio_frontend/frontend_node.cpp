@@ -200,8 +200,9 @@ void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
 void FrontendNode::tell_silence(LioStatus& status) const {
   const std::chrono::duration<double> silence = std::chrono::steady_clock::now() - imu_heard_;
   if (!status.running || silence.count() < kSilence_s) return;
+  const std::string known = status.trust == Trust::kOk ? "" : "; " + status.reason;
   status.trust = std::max(status.trust, Trust::kDegraded);
-  status.reason = std::format("no IMU data for {:.0f} s, the pose stands still", silence.count());
+  status.reason = std::format("no IMU data for {:.0f} s, the pose stands still{}", silence.count(), known);
 }
 
 void FrontendNode::publish_health() {

@@ -50,6 +50,11 @@ class Seen:
     status: dict[str, Any] = field(default_factory=dict)
     frontend_work: float = 0.0  # [s] of a processor
 
+    def newest_with_data(self) -> Any:
+        """The front end's last word before it missed the player, which had ended."""
+        spoken = self.health["lio_frontend"]
+        return next(each for each in reversed(spoken) if not each.state_text.startswith("no IMU data"))
+
     def rejected(self, process: str, channel: str) -> int:
         """What the process says that it refused on the channel."""
         newest = self.health[process][-1]

@@ -57,7 +57,7 @@ def test_fault_f7_scans_ten_times_too_often_are_refused_by_name_and_the_pose_sta
         late_until = time.monotonic() + LATE_S
         while len(stats) < scans - 1 and time.monotonic() < late_until:
             run.listen(0.2)
-        newest = run.seen.health["lio_frontend"][-1]
+        newest = run.seen.newest_with_data()
         worked_ms = 1e3 * run.work("lio_frontend") / len(stats)
     refused = [each for each in stats if each.reason == types.scan_stats_t.TOO_OFTEN]
     spent = np.array([each.time_spent_ms for each in stats])

@@ -130,7 +130,7 @@ def test_fault_t2_all_frozen_for_seconds_is_a_gap_of_the_sensor(drive_log: Path,
                     process.send_signal(signal.SIGCONT)
 
         run.play(drive_log, meanwhile, speed=1.0)
-        newest = run.seen.health["lio_frontend"][-1]
+        newest = run.seen.newest_with_data()
     assert state["frozen"] and math.isfinite(state["woken"])
     states = run.seen.states
     assert all(a < b for a, b in pairwise(states)), "stamps of LIO_STATE ascend"
