@@ -37,9 +37,9 @@ std::string drops_text(std::int64_t clouds) {
 }
 
 std::string refusal_text(const HudData& hud) {
-  const std::string text = std::format("{} clouds and {} poses refused", hud.refused_clouds, hud.refused_poses);
-  if (hud.refused_points == 0) return text;
-  return std::format("{}, and {} points that no map can hold", text, hud.refused_points);
+  std::string text = std::format("{} clouds and {} poses refused", hud.refused_clouds, hud.refused_poses);
+  if (hud.refused_points > 0) text += std::format(", and {} points that no map can hold", hud.refused_points);
+  return text;
 }
 
 double now_s() { return seconds(std::chrono::steady_clock::now().time_since_epoch()); }
