@@ -42,8 +42,8 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
     checkpoints_ = std::make_unique<CheckpointFolder>(checkpoint_folder);
     resume();
   }
-  link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue,
-                         [this](const imu_t& message) { return on_imu(message); });
+  imu_counts_ = &link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue,
+                                        [this](const imu_t& message) { return on_imu(message); });
   scan_counts_ = &link_.subscribe<scan_t>(channels::kScan, config_.lcm.scan_queue,
                                           [this](const scan_t& part) { on_scan_part(part); });
   request_counts_ = &link_.subscribe<keyframe_request_t>(
@@ -92,9 +92,13 @@ void FrontendNode::spin_once() {
 
 const char* FrontendNode::on_imu(const imu_t& message) {
   const auto [result, milliseconds] = timed([&] { return lio_.add_imu(messages::from_message(message)); });
+  if (result.fault == ImuFault::kDuplicate) {
+    ++imu_counts_->rejected;  // nothing is lost by what a network doubles
+    return "";
+  }
   if (result.fault != ImuFault::kNone) return text(result.fault);
   newest_utime_ = message.utime;
-  imu_heard_ = std::chrono::steady_clock::now();
+  data_heard_ = std::chrono::steady_clock::now();
   publish(result.scans, milliseconds);
   keep_end_of_session();
   if (!result.state) return "";
@@ -104,6 +108,7 @@ const char* FrontendNode::on_imu(const imu_t& message) {
 }
 
 void FrontendNode::on_scan_part(const scan_t& part) {
+  data_heard_ = std::chrono::steady_clock::now();
   std::optional<Scan> scan = assembler_.add(part);
   scan_counts_->queue_drops = assembler_.incomplete();
   if (!scan) return;
@@ -196,13 +201,13 @@ void FrontendNode::on_cloud_request(const keyframe_request_t& request) {
   }
 }
 
-/// Lio's clock is the sensor's: it does not hear that nothing comes any more.
+/// Lio's clock is the sensor's: it does not hear that neither samples nor scans come any more.
 void FrontendNode::tell_silence(LioStatus& status) const {
-  const std::chrono::duration<double> silence = std::chrono::steady_clock::now() - imu_heard_;
+  const std::chrono::duration<double> silence = std::chrono::steady_clock::now() - data_heard_;
   if (!status.running || silence.count() < kSilence_s) return;
   const std::string known = status.trust == Trust::kOk ? "" : "; " + status.reason;
   status.trust = std::max(status.trust, Trust::kDegraded);
-  status.reason = std::format("no IMU data for {:.0f} s, the pose stands still{}", silence.count(), known);
+  status.reason = std::format("no sensor data for {:.0f} s, the pose stands still{}", silence.count(), known);
 }
 
 void FrontendNode::publish_health() {

@@ -52,6 +52,7 @@ class FrontendNode {
   runtime::IgnisConfig config_;
   std::string config_hash_;
   runtime::LcmLink link_;
+  runtime::ReceiverCounts* imu_counts_ = nullptr;
   runtime::ReceiverCounts* scan_counts_ = nullptr;
   runtime::ReceiverCounts* request_counts_ = nullptr;
   runtime::ReceiverCounts* cloud_request_counts_ = nullptr;
@@ -66,7 +67,7 @@ class FrontendNode {
   RateLimit resends_{100.0, 100.0};      // keyframes a second; back end and map together ask for at most 85
   RateLimit cloud_resends_{50.0, 50.0};  // answers a second; one map asks for 24 messages at a time
   Utime newest_utime_ = 0;
-  std::chrono::steady_clock::time_point imu_heard_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point data_heard_ = std::chrono::steady_clock::now();
   StateOrder order_;
   std::int32_t state_sequence_ = 0;
   std::int32_t scan_sequence_ = 0;

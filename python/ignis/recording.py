@@ -43,7 +43,8 @@ class Recording:
         self.config = effective_config(options.config or checkout / _DEFAULT_CONFIG)
         default_url = os.environ.get("LCM_DEFAULT_URL") or self.config.get("lcm", {}).get("url", "")
         self.url: str = options.lcm_url or default_url
-        self.output: Path = options.output or Path(f"ignis-{datetime.now():%Y%m%d-%H%M%S}.lcmlog")
+        name = options.output or Path(f"ignis-{datetime.now():%Y%m%d-%H%M%S}.lcmlog")
+        self.output: Path = name.absolute()  # of a working folder that is removed nothing else would lead back
         self.folder = self.output.resolve().parent
         self._refuse_what_cannot_work()
         self.tail = LogTail(self.file(0))
@@ -110,7 +111,7 @@ class Recording:
         """What the disk has left; 0 while the folder is gone."""
         try:
             return shutil.disk_usage(self.folder).free / 1e6
-        except FileNotFoundError:
+        except OSError:  # gone, or the card was pulled
             return 0.0
 
     def publish_config(self) -> None:
@@ -155,6 +156,7 @@ class Recording:
             self.paused = True
             self.interruptions.append(obstacle)
             return f"{obstacle}: paused until there is room"
+        self.look()  # a split recording may have gone on, and its last part have been taken away
         if self.tail.is_lost():
             self._end_logger()
             return self._interrupted(f"{self.tail.path} was removed")

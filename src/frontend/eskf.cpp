@@ -145,7 +145,11 @@ bool make_symmetric(ErrorCovariance& covariance) {
 }
 
 bool is_covariance(const ErrorCovariance& matrix) {
-  return matrix.allFinite() && Eigen::LLT<ErrorCovariance>(matrix).info() == Eigen::Success;
+  constexpr double kRounding = 1e-9;  // of a variance
+  if (!matrix.allFinite()) return false;
+  ErrorCovariance rounded = matrix;
+  rounded.diagonal() *= 1.0 + kRounding;
+  return Eigen::LLT<ErrorCovariance>(rounded).info() == Eigen::Success;
 }
 
 }  // namespace ignis

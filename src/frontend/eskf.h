@@ -78,7 +78,7 @@ void predict(FilterState& filter, const InertialInput& input, double dt, const F
 /// Makes a covariance exactly symmetric. Returns false when it is not finite or a variance is not positive.
 [[nodiscard]] bool make_symmetric(ErrorCovariance& covariance);
 
-/// Finite, and positive definite.
+/// Finite, and positive definite but for rounding.
 [[nodiscard]] bool is_covariance(const ErrorCovariance& matrix);
 
 }  // namespace ignis

@@ -78,7 +78,7 @@ LioStatus Lio::status() const {
   LioStatus status;
   status.running = running_;
   status.text = start_text();
-  status.trust = running_ ? trust_.trust() : Trust::kDegraded;
+  status.trust = running_ ? trust_.trust_now() : Trust::kDegraded;
   status.reason = running_ ? trust_.reason() : start_note_.empty() ? status.text : start_note_ + "; " + status.text;
   return status;
 }
@@ -149,7 +149,7 @@ std::vector<ScanResult> Lio::add_scan(Scan scan) {
   }
   last_scan_end_ = scan.end_utime();
   trust_.note_arrival(scan.end_utime());
-  pending_.push_back(std::move(scan));
+  pending_.push_back(with_times(std::move(scan)));
   coast_to(*last_scan_end_ - to_micros(config_.imu_timeout_s));
   results = process_pending();
   forget_old_samples();  // those made up while the IMU is silent, too
@@ -195,11 +195,9 @@ bool Lio::comes_too_soon(const Scan& scan) const {
   return overlaps || scan.end_utime() - *last_scan_end_ < kMinScanPeriodUs;
 }
 
-bool Lio::is_deskewed(const Scan& scan) const { return config_.deskew && carries_times(scan); }
-
 std::vector<CloudPoint> Lio::register_points(const Scan& scan) {
   std::vector<CloudPoint> cloud;
-  if (is_deskewed(scan)) {
+  if (config_.deskew) {
     deskewer_.deskew(scan, filter_.nominal, imu_.samples(), config_.gravity_m, cloud);
     return cloud;
   }
@@ -223,11 +221,11 @@ ScanResult Lio::process(const Scan& scan) {
   std::vector<CloudPoint> cloud = register_points(selection.scan);
   const FilterState predicted = filter_;
   std::vector<CloudPoint> sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
-  const double age = is_deskewed(selection.scan) ? mean_age(selection.scan) : 0.0;
+  const double age = config_.deskew ? mean_age(selection.scan) : 0.0;
   const double seen_age = age * new_share(filter_.covariance, mapped_velocity_variance_);
   MatchResult match = correct(cloud, sparse, seen_age);
   match.stats.points = selection.in_range;
-  match.stats.untimed = !carries_times(selection.scan);
+  match.stats.of_one_instant = is_of_one_instant(scan);
   filter_ = match.filter;
   if (learns_nothing()) keep_biases(predicted);
   count_correction(predicted, match, seen_age);

@@ -120,7 +120,6 @@ class Lio {
   void coast_to(Utime utime);
   /// Whether the vehicle stands at the committed instant.
   bool use_standstill();
-  [[nodiscard]] bool is_deskewed(const Scan& scan) const;
   [[nodiscard]] std::vector<CloudPoint> register_points(const Scan& scan);
   [[nodiscard]] bool learns_nothing() const;
   void keep_biases(const FilterState& predicted);

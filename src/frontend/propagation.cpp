@@ -59,7 +59,9 @@ void Lio::follow_to(Utime utime) {
 
 /// To an instant before which no scan is waited for any more.
 void Lio::commit_to(Utime utime) {
-  if (utime - filter_.nominal.utime >= kCommitStepUs) follow_to(utime);
+  if (utime - filter_.nominal.utime < kCommitStepUs) return;
+  follow_to(utime);
+  if (is_sound()) sound_ = filter_;
 }
 
 /// The state at an instant without anything but the IMU since then.

@@ -14,10 +14,16 @@ double mean_age(const Scan& scan) {
   return sum / static_cast<double>(scan.points.size());
 }
 
-bool carries_times(const Scan& scan) {
-  if (scan.points.empty() || scan.duration_us == 0) return true;
-  const auto differs = [&](const ScanPoint& point) { return point.dt_us != scan.points.front().dt_us; };
-  return std::ranges::any_of(scan.points, differs);
+bool is_of_one_instant(const Scan& scan) {
+  if (scan.points.size() < 2 || scan.duration_us == 0) return false;
+  const std::int32_t first = scan.points.front().dt_us;
+  return std::ranges::all_of(scan.points, [first](const ScanPoint& point) { return point.dt_us == first; });
+}
+
+Scan with_times(Scan scan) {
+  if (!is_of_one_instant(scan) || scan.points.front().dt_us != 0) return scan;
+  for (ScanPoint& point : scan.points) point.dt_us = scan.duration_us;
+  return scan;
 }
 
 double unseen_turn_variance(double gyro_noise, double seconds) { return gyro_noise * gyro_noise * seconds / 3.0; }

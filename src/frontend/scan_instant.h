@@ -15,8 +15,12 @@ namespace ignis {
 /// Seconds from the mean instant of a scan's points to its end; zero for a scan without points.
 [[nodiscard]] double mean_age(const Scan& scan);
 
-/// Whether its points say when they were measured: not when a scan that lasts has all of them at one instant.
-[[nodiscard]] bool carries_times(const Scan& scan);
+/// Whether a scan that lasts has all of its points, two and more, at one instant.
+[[nodiscard]] bool is_of_one_instant(const Scan& scan);
+
+/// The scan. When all of its points seem to be of its beginning they carry no times, and count as of its end, where
+/// they need not be moved.
+[[nodiscard]] Scan with_times(Scan scan);
 
 /// Variance [rad^2], per axis, of the turn that the gyro's noise adds between the instants of a scan's points, in their
 /// mean, and its end. The points are carried to the end by that turn, so scan matching does not see it: the attitude

@@ -46,7 +46,7 @@ bool is_contradiction(ScanReason reason) {
 
 std::string explanation(const ScanStats& stats) {
   std::string words(text(stats.reason));
-  if (stats.untimed) words += "; not deskewed, its points carry no times";
+  if (stats.of_one_instant) words += "; not deskewed, its points are all of one instant";
   if (!stats.unobserved.empty()) words += "; not observed: " + stats.unobserved;
   return words;
 }

@@ -57,7 +57,7 @@ struct ScanStats {
   double nis = 0.0;
   int nis_directions = 0;
   bool standing = false;          ///< the vehicle stands
-  bool untimed = false;           ///< its points carry no times: it was taken as it is
+  bool of_one_instant = false;    ///< all of its points are: within the scan nothing was deskewed
   double imu_disagreement = 0.0;  ///< [sigma] by which scans and IMU disagree about the last two seconds
   /// These directions in words, see describe(), and why the place is doubtful, see reacquire().
   std::string unobserved;

@@ -13,6 +13,7 @@ constexpr int kScansUntilDegraded = 5;      // without a correction
 constexpr double kSecondsUntilLost = 2.0;   // without a correction
 constexpr double kSilentImuSeconds = 0.1;   // of scan time
 constexpr double kSilentScanSeconds = 0.5;  // of inertial time: five scans of a spinning LiDAR
+constexpr double kSilentScans = 2.5;        // periods of a slower one
 constexpr int kScansToConfirm = 10;         // applied ones, after silence or a loss
 constexpr double kOpinionSeconds = 2.0;     // over which scans and IMU are compared
 constexpr double kMaxDisagreement = 8.0;    // sigma
@@ -29,11 +30,15 @@ void TrustMonitor::note_imu(Utime utime) {
 }
 
 void TrustMonitor::note_arrival(Utime scan_end) {
-  const bool came_too_late = is_out_of_sight();
+  if (newest_scan_ && scan_end > *newest_scan_) {
+    const double interval = seconds_between(*newest_scan_, scan_end);
+    scan_period_ = std::min(interval, last_interval_);
+    last_interval_ = interval;
+  }
   newest_scan_ = newest_scan_ ? std::max(*newest_scan_, scan_end) : scan_end;
-  if (!came_too_late && !is_out_of_sight()) return;
+  if (!is_out_of_sight(*newest_scan_)) return;
   unseen_ = true;
-  scans_to_confirm_ = kScansToConfirm;
+  scans_to_confirm_ = std::max(scans_to_confirm_, kScansToConfirm);
 }
 
 void TrustMonitor::note_scan(const ScanEvidence& evidence) {
@@ -49,7 +54,10 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   corrections_.push_back({stats.utime, evidence.velocity_correction});
   while (seconds_between(corrections_.front().utime, stats.utime) > kOpinionSeconds) corrections_.pop_front();
   // The first scan has no map to agree with: that is a beginning, not a fault.
-  if (stats.reason == ScanReason::kMapEmpty) return;
+  if (stats.reason == ScanReason::kMapEmpty) {
+    last_applied_ = stats.utime;
+    return;
+  }
   if (!stats.applied()) {
     ++scans_since_applied_;
     return;
@@ -79,7 +87,10 @@ void TrustMonitor::forget_uncertain_start() {
 
 void TrustMonitor::note_resumption() {
   resumed_ = true;
-  newest_scan_.reset();  // the gap is known: how long no scan has come counts from the next one on
+  unseen_ = unseen_ || (newest_imu_ && is_out_of_sight(*newest_imu_));
+  // The gap is known: how long no scan has come, or fitted, counts from the next one on.
+  newest_scan_.reset();
+  last_applied_.reset();
   scans_to_confirm_ = kScansToConfirm;
   corrections_.clear();
 }
@@ -116,14 +127,12 @@ double TrustMonitor::seconds_since_arrival() const {
   return newest_imu_ && newest_scan_ ? seconds_between(*newest_scan_, *newest_imu_) : 0.0;
 }
 
-double TrustMonitor::seconds_without_scan() const {
-  if (!last_applied_ || !newest_scan_) return 0.0;
-  return seconds_between(*last_applied_, *newest_scan_) + std::max(seconds_since_arrival(), 0.0);
+bool TrustMonitor::scans_are_silent() const {
+  return seconds_since_arrival() > std::max(kSilentScanSeconds, kSilentScans * scan_period_);
 }
 
-bool TrustMonitor::is_out_of_sight() const {
-  const bool none_fits = scans_since_applied_ >= kScansUntilDegraded || seconds_since_arrival() > kSilentScanSeconds;
-  return none_fits && seconds_without_scan() > kSecondsUntilLost;
+bool TrustMonitor::is_out_of_sight(Utime at) const {
+  return last_applied_ && seconds_between(*last_applied_, at) > kSecondsUntilLost;
 }
 
 double TrustMonitor::disagreement() const {
@@ -139,19 +148,23 @@ double TrustMonitor::disagreement() const {
 }
 
 Trust TrustMonitor::trust() const {
-  if (!lost_.empty() || unseen_ || position_sigma_ > config_.lost_sigma_m || is_out_of_sight()) return Trust::kLost;
+  if (!lost_.empty() || unseen_ || position_sigma_ > config_.lost_sigma_m) return Trust::kLost;
   if (scans_since_applied_ >= kScansUntilDegraded || position_sigma_ > config_.degraded_sigma_m ||
-      sigma_since_start_ > usual_sigma() || seconds_without_imu() > kSilentImuSeconds ||
-      seconds_since_arrival() > kSilentScanSeconds || scans_to_confirm_ > 0 || disagreement() > kMaxDisagreement ||
-      restless_) {
+      sigma_since_start_ > usual_sigma() || seconds_without_imu() > kSilentImuSeconds || scans_to_confirm_ > 0 ||
+      disagreement() > kMaxDisagreement || restless_) {
     return Trust::kDegraded;
   }
   return Trust::kOk;
 }
 
+Trust TrustMonitor::trust_now() const {
+  if (!scans_are_silent()) return trust();
+  return std::max(trust(), is_out_of_sight(*newest_imu_) ? Trust::kLost : Trust::kDegraded);
+}
+
 std::string TrustMonitor::reason() const {
   if (!lost_.empty()) return std::format("lost: {} ({} applied scans to go)", lost_, scans_to_confirm_);
-  if (seconds_since_arrival() > kSilentScanSeconds) {
+  if (scans_are_silent()) {
     return std::format("no scan for {:.1f} s, going on with the IMU alone", seconds_since_arrival());
   }
   if (position_sigma_ > config_.degraded_sigma_m) {

@@ -64,8 +64,11 @@ class TrustMonitor {
   /// The scans were asked after all.
   void forget_uncertain_start();
 
+  /// As of the newest scan.
   [[nodiscard]] Trust trust() const;
-  /// Why the trust is not kOk; what happened last when it is.
+  /// The same with what inertial samples tell since then: that no scan comes any more.
+  [[nodiscard]] Trust trust_now() const;
+  /// Why that is not kOk; what happened last when it is.
   [[nodiscard]] std::string reason() const;
   /// [sigma] by which scans and IMU disagree about the last two seconds.
   [[nodiscard]] double disagreement() const;
@@ -79,14 +82,17 @@ class TrustMonitor {
   [[nodiscard]] double seconds_without_imu() const;
   /// [s] of inertial samples since the newest scan, used or not.
   [[nodiscard]] double seconds_since_arrival() const;
-  [[nodiscard]] double seconds_without_scan() const;
-  [[nodiscard]] bool is_out_of_sight() const;
+  [[nodiscard]] bool scans_are_silent() const;
+  /// For too long no scan has fitted.
+  [[nodiscard]] bool is_out_of_sight(Utime at) const;
   void follow(const Eigen::Vector3d& position);
   [[nodiscard]] double usual_sigma() const;
 
   FrontendConfig config_;
   std::optional<Utime> newest_imu_;
   std::optional<Utime> newest_scan_;
+  double scan_period_ = 0.0;    ///< [s] the shorter one of the last two intervals between scans
+  double last_interval_ = 0.0;  ///< [s]
   std::optional<Utime> last_applied_;
   std::string last_reason_;
   int scans_since_applied_ = 0;
@@ -113,6 +119,8 @@ class TrustMonitor {
   friend void transfer(auto& io, FieldsOf<TrustMonitor> auto& monitor) {
     io.maybe(monitor.newest_imu_);
     io.maybe(monitor.newest_scan_);
+    io.number(monitor.scan_period_);
+    io.number(monitor.last_interval_);
     io.maybe(monitor.last_applied_);
     io.text(monitor.last_reason_);
     io.number(monitor.scans_since_applied_);

@@ -53,7 +53,7 @@ class Seen:
     def newest_with_data(self) -> Any:
         """The front end's last word before it missed the player, which had ended."""
         spoken = self.health["lio_frontend"]
-        return next(each for each in reversed(spoken) if not each.state_text.startswith("no IMU data"))
+        return next(each for each in reversed(spoken) if not each.state_text.startswith("no sensor data"))
 
     def rejected(self, process: str, channel: str) -> int:
         """What the process says that it refused on the channel."""

@@ -320,7 +320,7 @@ TEST(Fault_F8, AScanWithoutPointTimesIsTakenAsItIsAndSaysSo) {
   const Watched run(input);
   const ScanStats& stats = run.scans.back().stats;
   EXPECT_TRUE(stats.applied());
-  EXPECT_NE(explanation(stats).find("not deskewed, its points carry no times"), std::string::npos);
+  EXPECT_NE(explanation(stats).find("not deskewed, its points are all of one instant"), std::string::npos);
   EXPECT_EQ(explanation(run.scans[90].stats).find("deskewed"), std::string::npos) << "these had some";
   EXPECT_LT(run.error_at_end(), 0.2);
 }

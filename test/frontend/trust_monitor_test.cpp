@@ -38,7 +38,7 @@ class Feed {
 };
 
 void expect(const TrustMonitor& monitor, Trust trust, const std::string& words) {
-  EXPECT_EQ(monitor.trust(), trust);
+  EXPECT_EQ(monitor.trust_now(), trust);
   EXPECT_NE(monitor.reason().find(words), std::string::npos) << monitor.reason();
 }
 
@@ -92,6 +92,32 @@ TEST(TrustMonitor, ScansThatComeNoMoreDegradeAndTwoSecondsWithoutThemLose) {
   expect(feed.monitor, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
   feed.run(1);
   expect(feed.monitor, Trust::kOk, "OK");
+}
+
+TEST(TrustMonitor, ScansThatAreSeldomAreNotSilent) {
+  Feed feed;
+  for (int i = 0; i < 5; ++i) {
+    feed.run_without_scans(0.8);
+    if (i > 1) expect(feed.monitor, Trust::kOk, "OK");  // by then it is known how often they come
+    feed.run(1);
+  }
+}
+
+TEST(TrustMonitor, ALossOutlivesASilenceOfBothStreams) {
+  Feed feed;
+  feed.run_without_scans(3.0);
+  feed.monitor.note_resumption();
+  feed.run(9);
+  EXPECT_EQ(feed.monitor.trust_now(), Trust::kLost) << feed.monitor.reason();
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, "OK");
+}
+
+TEST(TrustMonitor, WhatIsSaidOfAScanDoesNotDependOnHowFarTheSamplesAreAhead) {
+  Feed feed;
+  feed.run_without_scans(1.0);
+  EXPECT_EQ(feed.monitor.trust(), Trust::kOk);
+  expect(feed.monitor, Trust::kDegraded, "no scan for 1.0 s");
 }
 
 TEST(TrustMonitor, ARefusedScanNowAndThenDoesNotHideThatNoneFits) {
