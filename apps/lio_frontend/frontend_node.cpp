@@ -19,7 +19,7 @@ constexpr int kPollMs = 100;
 constexpr int kRequestQueue = 100;
 // In one answer, so that the live flow goes on: of the clouds that a map asks for at a time, and of their keyframes.
 constexpr std::size_t kMostResentParts = 36;
-constexpr double kSilence_s = 1.0;
+constexpr double kSilence_s = 1.0;            // of both streams, of this computer's time
 constexpr Utime kCheckpointPeriod = 400'000;  // [us]
 
 /// Calls `work` and returns its result with the wall time it took [ms].

@@ -30,7 +30,7 @@ std::string given_up_text(std::int64_t keyframes) {
   return std::format("the clouds of {} keyframes are given up: nobody sends them again", keyframes);
 }
 
-/// Empty while nothing was dropped.
+/// What stands behind the state in HEALTH; empty while nothing was dropped.
 std::string drops_text(std::int64_t clouds) {
   if (clouds == 0) return {};
   return std::format("; map.max_keyframe_points is reached, the {} farthest keyframe clouds are dropped", clouds);

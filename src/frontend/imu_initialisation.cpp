@@ -155,11 +155,12 @@ std::string ImuInitialisation::tilt_refusal(const Window& window, double limit) 
   const Eigen::Vector3d& force = window.accel_mean;
   const double tilt = std::acos(std::clamp(force.normalized().dot(frames::up()), -1.0, 1.0));
   if (tilt <= limit) return "";
+  const std::string measured =
+      std::format("({:.2f}, {:.2f}, {:.2f}) +- {:.2f} m/s^2", force.x(), force.y(), force.z(), window.accel_sigma);
   return std::format(
-      "gravity is {:.0f} degrees away from the body's up axis (limit {:.0f}), specific force ({:.2f}, {:.2f}, {:.2f}) "
-      "+- "
-      "{:.2f} m/s^2: axes swapped or negated?",
-      tilt * kDegrees, limit * kDegrees, force.x(), force.y(), force.z(), window.accel_sigma);
+      "gravity is {:.0f} degrees away from the body's up axis (limit {:.0f}), specific force {}: axes swapped or "
+      "negated?",
+      tilt * kDegrees, limit * kDegrees, measured);
 }
 
 /// What a vehicle in motion accelerates by looks like a tilt.

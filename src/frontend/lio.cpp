@@ -320,6 +320,7 @@ void Lio::mend_filter() {
     return;
   }
   const Utime now = filter_.nominal.utime;
+  // What was sound longer ago than samples are kept goes on from the oldest of them.
   sound_.nominal.utime = std::max(sound_.nominal.utime, imu_.samples().front().utime);
   filter_ = dead_reckoned(sound_, now);
   cautious_ = filter_.covariance;

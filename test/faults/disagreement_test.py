@@ -43,6 +43,11 @@ class Bus:
         self.pipeline = pipeline
         self.listener = Listener(BUS, "HEALTH")
 
+    def start(self, process: str, config: Path = CONFIG) -> None:
+        """Starts a process and waits for its first word."""
+        self.pipeline.start(process, "--config", config)
+        self.wait(lambda: self.health(process) is not None)
+
     def health(self, process: str) -> Any:
         """The newest HEALTH of a process."""
         found = [entry for (name, _), entry in self.listener.health.items() if name == process]
@@ -71,15 +76,13 @@ def test_fault_c4_processes_that_disagree_are_a_fault_within_two_seconds_and_kee
     shutil.copy(CONFIG, file)
     with Pipeline(tmp_path, BUS) as pipeline:
         bus = Bus(pipeline)
-        pipeline.start("lio_frontend", "--config", file)
-        bus.wait(lambda: bus.health("lio_frontend") is not None)
+        bus.start("lio_frontend", file)
         before = bus.health("lio_frontend")
         # The file is edited while one process runs and before the other starts.
         text = file.read_text()
         file.write_text(text.replace('"keyframe_dist_m": ', '"keyframe_dist_m": 1'))
         assert file.read_text() != text
-        pipeline.start("graph_backend", "--config", file)
-        bus.wait(lambda: bus.health("graph_backend") is not None)
+        bus.start("graph_backend", file)
         took = bus.wait(lambda: all(bus.is_fault(name, "configuration differs") for name in PAIR))
         after = bus.health("lio_frontend")
     assert took < FAULT_WITHIN_S + BUSY_S
@@ -91,8 +94,7 @@ def test_fault_c4_two_builds_of_one_release_are_a_fault_within_two_seconds(
 ) -> None:
     with Pipeline(tmp_path, BUS) as pipeline:
         bus = Bus(pipeline)
-        pipeline.start("lio_frontend", "--config", CONFIG)
-        bus.wait(lambda: bus.health("lio_frontend") is not None)
+        bus.start("lio_frontend")
         ours = bus.health("lio_frontend")
         bus.listener.listen(1.5)
         assert not bus.is_fault("lio_frontend", "version")
@@ -156,8 +158,7 @@ def test_fault_p7_a_process_that_is_killed_and_started_again_and_again_is_a_faul
 ) -> None:
     with Pipeline(tmp_path, BUS) as pipeline:
         bus = Bus(pipeline)
-        pipeline.start("graph_backend", "--config", CONFIG)
-        bus.wait(lambda: bus.health("graph_backend") is not None)
+        bus.start("graph_backend")
         for _ in range(STARTS):
             process = pipeline.start("lio_frontend", "--config", CONFIG)
             bus.wait(lambda pid=process.pid: ("lio_frontend", pid) in bus.listener.health)

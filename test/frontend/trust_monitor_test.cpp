@@ -42,6 +42,14 @@ void expect(const TrustMonitor& monitor, Trust trust, const std::string& words) 
   EXPECT_NE(monitor.reason().find(words), std::string::npos) << monitor.reason();
 }
 
+/// Nine scans that fit do not end what awaits ten of them; the tenth does.
+void expect_until_ten_fit(Feed& feed, Trust trust, const std::string& words, const std::string& then = "OK") {
+  feed.run(9);
+  expect(feed.monitor, trust, words);
+  feed.run(1);
+  expect(feed.monitor, Trust::kOk, then);
+}
+
 TEST(TrustMonitor, IsOkWhileScansAgree) {
   const Feed feed;
   expect(feed.monitor, Trust::kOk, "OK");
@@ -50,10 +58,7 @@ TEST(TrustMonitor, IsOkWhileScansAgree) {
 TEST(TrustMonitor, IsDegradedUntilTenScansBearOutWhatWasTakenBack) {
   Feed feed;
   feed.monitor.note_contradiction();
-  feed.run(9);
-  expect(feed.monitor, Trust::kDegraded, "scans took back a velocity that the IMU is sure of");
-  feed.run(1);
-  expect(feed.monitor, Trust::kOk, "OK");
+  expect_until_ten_fit(feed, Trust::kDegraded, "scans took back a velocity that the IMU is sure of");
 }
 
 TEST(TrustMonitor, FiveScansWithoutACorrectionDegradeAndTwoSecondsLose) {
@@ -72,10 +77,7 @@ TEST(TrustMonitor, ScansThatFitAgainAfterALossFindThePlaceOnlyOnceTenOfThemAgree
   feed.evidence.stats.reason = ScanReason::kTooFewMatches;
   feed.run(41);
   feed.evidence.stats.reason = ScanReason::kApplied;
-  feed.run(9);
-  expect(feed.monitor, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
-  feed.run(1);
-  expect(feed.monitor, Trust::kOk, "OK");
+  expect_until_ten_fit(feed, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
 }
 
 TEST(TrustMonitor, ScansThatComeNoMoreDegradeAndTwoSecondsWithoutThemLose) {
@@ -88,10 +90,7 @@ TEST(TrustMonitor, ScansThatComeNoMoreDegradeAndTwoSecondsWithoutThemLose) {
   expect(feed.monitor, Trust::kOk, "OK");
   feed.run_without_scans(2.1);
   expect(feed.monitor, Trust::kLost, "no scan for 2.1 s");
-  feed.run(9);
-  expect(feed.monitor, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
-  feed.run(1);
-  expect(feed.monitor, Trust::kOk, "OK");
+  expect_until_ten_fit(feed, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
 }
 
 TEST(TrustMonitor, ScansThatAreSeldomAreNotSilent) {
@@ -107,10 +106,7 @@ TEST(TrustMonitor, ALossOutlivesASilenceOfBothStreams) {
   Feed feed;
   feed.run_without_scans(3.0);
   feed.monitor.note_resumption();
-  feed.run(9);
-  EXPECT_EQ(feed.monitor.trust_now(), Trust::kLost) << feed.monitor.reason();
-  feed.run(1);
-  expect(feed.monitor, Trust::kOk, "OK");
+  expect_until_ten_fit(feed, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
 }
 
 TEST(TrustMonitor, WhatIsSaidOfAScanDoesNotDependOnHowFarTheSamplesAreAhead) {
@@ -194,10 +190,7 @@ TEST(TrustMonitor, ASilentImuDegradesWithin100MsAndIsForgivenTenScansAfterItsRet
 TEST(TrustMonitor, ALossIsAnnouncedAndSoIsBeingFoundAgain) {
   Feed feed;
   feed.monitor.note_loss("scans contradicted the map, a new one was begun");
-  feed.run(9);
-  expect(feed.monitor, Trust::kLost, "a new one was begun");
-  feed.run(1);
-  expect(feed.monitor, Trust::kOk, "found again after 1 loss");
+  expect_until_ten_fit(feed, Trust::kLost, "a new one was begun", "found again after 1 loss");
 }
 
 TEST(TrustMonitor, ScansThatKeepTakingTheVelocityAwayAreContradictedByTheImu) {
