@@ -225,6 +225,7 @@ ScanResult Lio::process(const Scan& scan) {
   const double seen_age = age * new_share(filter_.covariance, mapped_velocity_variance_);
   MatchResult match = correct(cloud, sparse, seen_age);
   match.stats.points = selection.in_range;
+  match.stats.unread = selection.unread;
   match.stats.of_one_instant = is_of_one_instant(scan);
   filter_ = match.filter;
   if (learns_nothing()) keep_biases(predicted);

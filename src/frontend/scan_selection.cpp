@@ -2,6 +2,13 @@
 #include "frontend/scan_selection.h"
 
 namespace ignis {
+namespace {
+
+// At most 30 ms of work, whatever arrives: a point that is thinned away costs 26 ns, one that is moved and mapped 180.
+constexpr std::size_t kMostToThin = 1'000'000;
+constexpr std::size_t kMostToKeep = 150'000;
+
+}  // namespace
 
 ScanSelector::ScanSelector(const FrontendConfig& config)
     : nearest2_(config.min_range_m * config.min_range_m),
@@ -15,6 +22,8 @@ const ScanSelection& ScanSelector::select(const Scan& scan) {
   selection_.scan.duration_us = scan.duration_us;
   selection_.scan.missing_packets = scan.missing_packets;
   selection_.in_range = 0;
+  const std::span<const ScanPoint> read = bounded(scan.points);
+  selection_.unread = static_cast<int>(scan.points.size() - read.size());
   const auto is_in_range = [&](const ScanPoint& point) {
     const double range2 = point.position.cast<double>().squaredNorm();
     const bool yes = range2 >= nearest2_ && range2 <= farthest2_;  // no for what is not finite, too
@@ -23,19 +32,27 @@ const ScanSelection& ScanSelector::select(const Scan& scan) {
   };
   std::vector<ScanPoint>& points = selection_.scan.points;
   points.clear();
-  if (voxel_ > 0.0 && std::ssize(scan.points) > max_points_) {
-    const auto picked = thinner_.pick(std::span<const ScanPoint>(scan.points), voxel_, is_in_range);
+  if (voxel_ > 0.0 && std::ssize(read) > max_points_) {
+    const auto picked = thinner_.pick(read, voxel_, is_in_range);
     if (selection_.in_range > max_points_) {
-      for (const VoxelThinner::Picked& each : picked)
-        points.push_back(scan.points[static_cast<std::size_t>(each.point)]);
+      for (const VoxelThinner::Picked& each : picked) points.push_back(read[static_cast<std::size_t>(each.point)]);
       return selection_;
     }
     selection_.in_range = 0;  // few enough without thinning: from the beginning
   }
-  for (const ScanPoint& point : scan.points) {
+  for (const ScanPoint& point : read) {
     if (is_in_range(point)) points.push_back(point);
   }
   return selection_;
+}
+
+std::span<const ScanPoint> ScanSelector::bounded(std::span<const ScanPoint> points) {
+  const std::size_t most = voxel_ > 0.0 ? kMostToThin : kMostToKeep;
+  if (points.size() <= most) return points;
+  const std::size_t step = (points.size() + most - 1) / most;
+  every_nth_.clear();
+  for (std::size_t i = 0; i < points.size(); i += step) every_nth_.push_back(points[i]);
+  return every_nth_;
 }
 
 }  // namespace ignis

@@ -47,6 +47,7 @@ bool is_contradiction(ScanReason reason) {
 std::string explanation(const ScanStats& stats) {
   std::string words(text(stats.reason));
   if (stats.of_one_instant) words += "; not deskewed, its points are all of one instant";
+  if (stats.unread > 0) words += "; " + std::to_string(stats.unread) + " points too many, which were not looked at";
   if (!stats.unobserved.empty()) words += "; not observed: " + stats.unobserved;
   return words;
 }

@@ -44,6 +44,7 @@ struct ScanStats {
   std::int32_t session = 0;  ///< +1 whenever the front end begins anew
   ScanReason reason = ScanReason::kNotInitialised;
   int points = 0;                    ///< after the range filter
+  int unread = 0;                    ///< points of a scan that is far too large that were not looked at
   int matched = 0;                   ///< points that found a plane, without what is new or moves
   int used = 0;                      ///< of these, inside the Mahalanobis gate in the last pass
   double mean_innovation = 0.0;      ///< [m] mean absolute distance at the predicted pose
