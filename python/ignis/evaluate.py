@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ignis.errors import InputError, run_command, run_quietly
-from ignis.evaluation.consistency import BAND, SIGMAS, band, inside_percent, nees_of, silent_percent
+from ignis.evaluation.consistency import BAND, SIGMAS, band, inside_percent, nees_of, nis_of, silent_percent
 from ignis.evaluation.drives import Simulation, simulated
 from ignis.files import write_text
 from ignis.mounts import refuse_mounts
@@ -30,6 +30,7 @@ _COLUMNS = (
     ("drift_percent", "drift %", "{:.2f}"),
     ("nees_position", "NEES pos.", "{:.2f}"),
     ("nees_attitude", "NEES att.", "{:.2f}"),
+    ("nis", "NIS", "{:.2f}"),
     ("inside_percent", f"in {SIGMAS:.0f} sigma %", "{:.1f}"),
     ("silent_percent", "silent %", "{:.1f}"),
     ("applied_percent", "applied %", "{:.1f}"),
@@ -84,6 +85,7 @@ def _replay(simulation: Simulation, variant: Variant, config: Path, folder: Path
         "drift_percent": eskf["end_error_percent"],
         "nees_position": position,
         "nees_attitude": attitude,
+        "nis": nis_of(out),
         "inside_percent": inside_percent(out, truth),
         "silent_percent": silent_percent(out, truth),
         "applied_percent": 100.0 * report["scans_applied"] / report["scans"],

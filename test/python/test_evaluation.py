@@ -9,7 +9,7 @@ import pytest
 
 from ignis.errors import InputError
 from ignis.evaluate import Row, Variant, table
-from ignis.evaluation.consistency import band, inside_percent, nees_of, silent_percent
+from ignis.evaluation.consistency import band, inside_percent, nees_of, nis_of, silent_percent
 from ignis.evaluation.drives import Simulation, changed_scene
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, rotation_matrix, write_tum
 
@@ -75,6 +75,15 @@ def test_a_vehicle_that_has_left_the_origin_by_its_first_pose_is_as_honest_as_on
     assert moving == pytest.approx(nees_of(tmp_path / "b", _replay(tmp_path / "b", 1, 1.0)), rel=1e-3)
 
 
+def test_nis_is_that_of_the_applied_scans_per_direction_that_they_observe(tmp_path: Path) -> None:
+    """Two scans that observe six and three directions; what a refused one says of none does not count."""
+    rows = ["utime,applied,nis,nis_directions", "1,1,3.0,6.0", "2,0,900.0,6.0", "3,1,1.5,3.0"]
+    (tmp_path / "scan_stats.csv").write_text("\n".join(rows) + "\n")
+    assert nis_of(tmp_path) == pytest.approx(0.5)
+    (tmp_path / "scan_stats.csv").write_text("\n".join(rows[:1]) + "\n")
+    assert nis_of(tmp_path) is None
+
+
 def test_few_poses_lie_outside_three_sigma_of_an_honest_covariance(tmp_path: Path) -> None:
     """In one of six coordinates: 1.6 %. With errors three times as large each coordinate is inside with 68 %."""
     assert inside_percent(tmp_path / "a", _replay(tmp_path / "a", 1, 1.0)) > 97.0
@@ -131,10 +140,18 @@ def test_table_lists_drives_in_order_and_means_over_seeds() -> None:
                 "applied_percent",
                 "named_percent",
                 "scan_p50_ms",
+                "scan_p99_ms",
             ),
             0.5,
         )
-        figures |= {"rpe_10m_m": None, "loops": 2, "nees_position": nees, "nees_attitude": 1.0, "scan_p99_ms": 2.0}
+        figures |= {
+            "rpe_10m_m": None,
+            "loops": 2,
+            "nees_position": nees,
+            "nees_attitude": 1.0,
+            "nis": None,
+            "scan_p99_ms": 2.0,
+        }
         return Row(Simulation("hall", seed, Path("a"), Path("b")), Variant("plain"), figures)
 
     text = table([row(2, 3.0), row(1, 1.0)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Normalised estimation error squared (NEES): are the errors of a drive what its covariances announce?
+"""Normalised squares of errors (NEES) and innovations (NIS): are they what the covariances of a drive announce?
 
 Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4.
 """
@@ -49,6 +49,15 @@ def silent_percent(folder: Path, truth: Trajectory) -> float:
     trust = trust[np.isin(estimate.utime, pair.estimate.utime)]
     off = position_errors(aligned_at_start(pair), pair.truth) > SILENT_M
     return float(100.0 * np.mean(off & (trust == _OK)))
+
+
+def nis_of(folder: Path) -> float | None:
+    """Normalised innovation squared of a replay's scans, per direction that they observe; none when none was applied.
+    The filter is told `residual_inflation` times the variance that single residuals have, so 1 is its upper end."""
+    with (folder / "scan_stats.csv").open(newline="") as stream:
+        applied = [row for row in csv.DictReader(stream) if row["applied"] == "1"]
+    directions = sum(float(row["nis_directions"]) for row in applied)
+    return sum(float(row["nis"]) for row in applied) / directions if directions else None
 
 
 def nees_of(folder: Path, truth: Trajectory) -> tuple[float, float]:
