@@ -72,7 +72,7 @@ void DriverPublisher::publish_status(const l1::SensorReport& report, const LinkR
   status.points_published = counters.points_published;
   status.points_filtered = counters.points_filtered;
   status.foreign_datagrams = link.refused;
-  status.clock_epoch = static_cast<std::int32_t>((first_epoch_ + counters.restarts) & kMaxEpoch);
+  status.clock_epoch = static_cast<std::int32_t>((first_epoch_ + counters.clock_restarts) & kMaxEpoch);
   status.sensor_time_s = housekeeping.sensor_time_s;
   status.clock_offset_us = decoder_.clock().offset_us();
   status.clock_drift_ppm = decoder_.clock().drift_ppm();

@@ -63,6 +63,7 @@ std::vector<std::byte> L1Decoder::take_outgoing() { return std::exchange(outgoin
 DecoderCounters L1Decoder::counters() const {
   DecoderCounters counters = counters_;
   static_cast<StreamCounters&>(counters) = stream_.counters();
+  counters.clock_restarts = counters.restarts + clock_.restarts();
   return counters;
 }
 

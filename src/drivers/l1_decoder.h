@@ -21,6 +21,7 @@ struct DecoderCounters : StreamCounters {
   std::int64_t scans_published = 0;
   std::int64_t points_published = 0;
   std::int64_t points_filtered = 0;  ///< by range or own structure
+  std::int64_t clock_restarts = 0;   ///< the stamps' clock began anew: the counters did, or arrivals contradict them
 };
 
 /// Bytes of an L1 in, measurements out. No clock, no device: arrival instants come with the bytes, answers for the

@@ -93,6 +93,10 @@ double SensorClock::imu_time(std::int64_t count) {
   return imu_stamps_.stamp(count, target);
 }
 
+std::int64_t SensorClock::restarts() const {
+  return scan_line_.restarts() + imu_upper_.restarts() + imu_lower_.restarts();
+}
+
 double SensorClock::offset_us() const { return by_arrival_ ? scan_line_.at(0) : start_us_; }
 double SensorClock::drift_ppm() const { return scan_line_.drift_ppm(); }
 double SensorClock::jitter_us() const { return scan_line_.jitter_us(); }

@@ -52,6 +52,9 @@ class SensorClock {
   /// [us] of inertial sample `count`. Call once per sample, in order.
   [[nodiscard]] double imu_time(std::int64_t count);
 
+  /// How often arrivals contradicted what was learnt, so that it was learnt anew: stamps may have leapt.
+  [[nodiscard]] std::int64_t restarts() const;
+
   /// [us] fitted arrival time of packet counter 0, [1e-6], [us]: for the status message. Zero for captures.
   [[nodiscard]] double offset_us() const;
   [[nodiscard]] double drift_ppm() const;
