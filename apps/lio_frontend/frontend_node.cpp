@@ -112,6 +112,7 @@ void FrontendNode::on_scan_part(const scan_t& part) {
   std::optional<Scan> scan = assembler_.add(part);
   scan_counts_->queue_drops = assembler_.incomplete();
   if (!scan) return;
+  ++scans_heard_;
   const auto [results, milliseconds] = timed([&] { return lio_.add_scan(std::move(*scan)); });
   publish(results, milliseconds);
 }
@@ -210,6 +211,18 @@ void FrontendNode::tell_silence(LioStatus& status) const {
   status.reason = std::format("no sensor data for {:.0f} s, the pose stands still{}", silence.count(), known);
 }
 
+/// A filter that bridges every gap is content; whoever drives must know that half of the margin is gone.
+void FrontendNode::tell_losses(LioStatus& status) {
+  const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  imu_losses_.look(now_s, imu_counts_->received, imu_counts_->lost);
+  scan_losses_.look(now_s, scans_heard_, scan_counts_->lost + assembler_.incomplete());
+  for (const std::string& trouble : {imu_losses_.trouble(), scan_losses_.trouble()}) {
+    if (trouble.empty()) continue;
+    status.reason = status.trust == Trust::kOk ? trouble : status.reason + "; " + trouble;
+    status.trust = std::max(status.trust, Trust::kDegraded);
+  }
+}
+
 void FrontendNode::publish_health() {
   if (lio_.start_note() != told_note_) {
     told_note_ = lio_.start_note();
@@ -217,6 +230,7 @@ void FrontendNode::publish_health() {
   }
   LioStatus status = lio_.status();
   tell_silence(status);
+  tell_losses(status);
   if (checkpoints_ && !checkpoints_->failure().empty()) {
     status.trust = std::max(status.trust, Trust::kDegraded);
     status.reason += "; " + checkpoints_->failure();

@@ -10,10 +10,12 @@
 
 #include "checkpoint_folder.h"
 #include "frontend/lio.h"
+#include "loss_watch.h"
 #include "messages/keyframe_messages.h"
 #include "messages/lio_command.h"
 #include "messages/odometry_messages.h"
 #include "messages/sensor_messages.h"
+#include "runtime/channels.h"
 #include "runtime/lcm_link.h"
 #include "runtime/rate_limit.h"
 #include "sent_clouds.h"
@@ -45,6 +47,7 @@ class FrontendNode {
   void publish(std::span<const ScanResult> scans, double milliseconds);
   void publish_health();
   void tell_silence(LioStatus& status) const;
+  void tell_losses(LioStatus& status);
   void resume();
   void keep(std::span<const ScanResult> scans);
   void keep_end_of_session();
@@ -58,6 +61,9 @@ class FrontendNode {
   runtime::ReceiverCounts* cloud_request_counts_ = nullptr;
   Lio lio_;
   messages::ScanAssembler assembler_;
+  std::int64_t scans_heard_ = 0;  // whole ones
+  LossWatch imu_losses_{runtime::channels::kImu};
+  LossWatch scan_losses_{runtime::channels::kScan};
   SentKeyframes sent_keyframes_{CheckpointFolder::kKeyframes};
   SentClouds sent_clouds_{10 * kMicrosPerSecond, 32'000'000};  // [us], [bytes]
   std::unique_ptr<CheckpointFolder> checkpoints_;

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import time
 import urllib.request
 from collections.abc import Callable
@@ -16,6 +17,7 @@ import ignis_lcm.ignis as types
 from l1_endurance import cpu_seconds
 
 from ignis.bus import open_bus
+from ignis.logs import LogEvent
 from ignis.pipeline import Pipeline
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
@@ -25,6 +27,8 @@ BUS = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 PORT = 18095
 SECONDS = 14.0
 SPEED = 2.0  # of the replay
+WHOLE_S = 3.0  # of the drive, for the start
+MEAN_BURST = 3  # messages that are lost at a time
 
 
 def record_drive(folder: Path, seconds: float = SECONDS) -> Path:
@@ -35,6 +39,21 @@ def record_drive(folder: Path, seconds: float = SECONDS) -> Path:
         if simulator.wait(300) != 0:
             raise RuntimeError(pipeline.last_words("l1_sim"))
     return log
+
+
+def lossy(events: list[LogEvent], share: float, generator: random.Random) -> list[LogEvent]:
+    """Loses this share of the sensor's messages, in bursts; the first three seconds stay whole for the start."""
+    kept, left = [], 0
+    begin = events[0].utime + 1e6 * WHOLE_S
+    for event in events:
+        if event.channel in ("L1_IMU", "L1_SCAN") and event.utime > begin:
+            if left == 0 and generator.random() < share / (MEAN_BURST * (1.0 - share)):
+                left = generator.randint(1, 2 * MEAN_BURST - 1)
+            if left > 0:
+                left -= 1
+                continue
+        kept.append(event)
+    return kept
 
 
 @dataclass
@@ -100,6 +119,13 @@ class FaultRun:
 
     def _start(self, name: str) -> None:
         self.pipeline.start(name, "--config", CONFIG, *self._options.get(name, ()))
+
+    def start_sensor(self, folder: Path) -> Path:
+        """A sensor that goes on by itself; returns the serial port that the driver reads it from."""
+        port = folder / "l1.pty"
+        self.pipeline.start("l1_sim", "--scene", SCENE, "--config", CONFIG, "--pty", port, "--wait", 30)
+        self.pipeline.wait_for_text("l1_sim", "waiting", 20.0)
+        return port
 
     def kill_and_restart(self, name: str) -> None:
         """Kills a process and starts it again at once."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fault_drive import CONFIG, SCENE
+from fault_drive import CONFIG, SCENE, lossy
 from ignis.logs import LogEvent, LogWriter, read_events
 from ignis.pipeline import binary
 from ignis.poses import read_tum
@@ -16,27 +16,11 @@ from ignis.trajectory_error import aligned_at_start, paired, position_errors
 
 SEED = 5
 DRIVE_S = 30.0
-MEAN_BURST = 3  # messages
 FLOOR_M = 0.01  # errors of a few millimetres are noise
 
 
 def run(name: str, *arguments: object) -> subprocess.CompletedProcess:
     return subprocess.run([binary(name), *map(str, arguments)], capture_output=True, text=True, timeout=300.0)
-
-
-def lossy(events: list[LogEvent], share: float, generator: random.Random) -> list[LogEvent]:
-    """Loses this share of the sensor's messages, in bursts; the first three seconds stay whole for the start."""
-    kept, left = [], 0
-    begin = events[0].utime + 3_000_000
-    for event in events:
-        if event.channel in ("L1_IMU", "L1_SCAN") and event.utime > begin:
-            if left == 0 and generator.random() < share / (MEAN_BURST * (1.0 - share)):
-                left = generator.randint(1, 2 * MEAN_BURST - 1)
-            if left > 0:
-                left -= 1
-                continue
-        kept.append(event)
-    return kept
 
 
 def replayed(events: list[LogEvent], folder: Path) -> float:
