@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
+#include <format>
 #include <vector>
 
 #include <arpa/inet.h>
@@ -29,6 +30,12 @@ std::optional<int> number_of(const std::string& text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+std::optional<std::string> option_in(const std::string& url, std::string_view name) {
+  const std::size_t at = url.find(name);
+  if (at == std::string::npos) return std::nullopt;
+  return url.substr(at + name.size(), url.find('&', at) - at - name.size());
 }
 
 /// LCM keeps its socket to itself, so it is looked up among this process's own.
@@ -64,11 +71,19 @@ std::optional<BusAddress> BusAddress::parse(const std::string& url) {
     if (!port || *port < 1 || *port > 65535) return std::nullopt;
     address.port = static_cast<std::uint16_t>(*port);
   }
-  if (const std::size_t at = rest.find("ttl="); at != std::string::npos) {
-    const std::string ttl = rest.substr(at + 4, rest.find('&', at) - at - 4);
-    address.stays_home = number_of(ttl).value_or(1) == 0;
+  if (const std::optional<std::string> ttl = option_in(rest, "ttl=")) {
+    address.stays_home = number_of(*ttl).value_or(1) == 0;
+  }
+  if (const std::optional<std::string> bytes = option_in(rest, "recv_buf_size=")) {
+    address.receive_buffer = number_of(*bytes).value_or(0);
   }
   return address;
+}
+
+std::string BusAddress::shortage(int given) const {
+  if (given >= receive_buffer) return {};
+  return std::format("the kernel gave {} of {} bytes for what waits on the bus (net.core.rmem_max)", given,
+                     receive_buffer);
 }
 
 std::optional<BusSocket> BusSocket::guard(const BusAddress& address) {
@@ -83,6 +98,13 @@ void BusSocket::ignore(const std::vector<UdpAddress>& senders) {
   if (senders == filter_.unheard) return;
   filter_.unheard = senders;
   filter_.attach(descriptor_);
+}
+
+int BusSocket::receive_buffer() const {
+  int doubled = 0;  // Linux counts its own overhead too
+  socklen_t length = sizeof doubled;
+  if (getsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &doubled, &length) != 0) return 0;
+  return doubled / 2;
 }
 
 std::uint32_t BusSocket::dropped() const {

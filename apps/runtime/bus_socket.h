@@ -16,9 +16,13 @@ struct BusAddress {
   std::string group = "239.255.76.67";  ///< as inet_ntop() writes it
   std::uint16_t port = 7667;
   bool stays_home = true;  ///< ttl=0: nobody sends to another computer, so nothing from one is ours
+  int receive_buffer = 0;  ///< [bytes] that LCM asks the kernel for; 0: whatever that gives
 
   /// Nothing for buses that are no UDP multicast, such as memq.
   static std::optional<BusAddress> parse(const std::string& url);
+
+  /// What to tell of a socket that was given so many bytes; empty when they are as many as were asked for.
+  [[nodiscard]] std::string shortage(int given) const;
 };
 
 /// Stands in front of LCM's receiving socket with a BusFilter in the kernel. What is refused, and what found the buffer
@@ -31,6 +35,10 @@ class BusSocket {
 
   /// From now on takes HEALTH alone from these senders, and everything from all others.
   void ignore(const std::vector<UdpAddress>& senders);
+
+  /// [bytes] that the kernel gave for what waits to be received: net.core.rmem_max cuts off what is asked beyond it,
+  /// and LCM does not mind.
+  [[nodiscard]] int receive_buffer() const;
 
   /// Datagrams that the kernel has dropped at this socket: refused by the filter, or the buffer was full.
   [[nodiscard]] std::uint32_t dropped() const;

@@ -21,7 +21,8 @@ constexpr std::chrono::milliseconds kTextPeriod{200};
 constexpr double kSamplePeriod_s = 1.0;
 constexpr double kHearingPeriod_s = 0.2;  // of HEALTH with the addresses
 constexpr int kHealthQueue = 100;
-constexpr char kSocketName[] = "UDP";  // in HEALTH, for what the kernel dropped before any channel was known
+constexpr int kReceiveBufferLimit = 8'388'608;  // [bytes] that the package sets and the doctor asks for
+constexpr char kSocketName[] = "UDP";           // in HEALTH, for what the kernel dropped before any channel was known
 
 Utime system_utime() {
   return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
@@ -56,7 +57,16 @@ void LcmLink::subscribe_raw(Receiver& receiver, int queue_capacity) {
   subscription->setQueueCapacity(queue_capacity);
   receiver.link = this;
   // LCM opens its socket at the first subscription.
-  if (address_ && !socket_) socket_ = BusSocket::guard(*address_);
+  if (address_ && !socket_) guard_socket();
+}
+
+void LcmLink::guard_socket() {
+  socket_ = BusSocket::guard(*address_);
+  if (!socket_) return;
+  shortage_ = address_->shortage(socket_->receive_buffer());
+  if (shortage_.empty()) return;
+  std::cerr << std::format("{}: {}; sudo sysctl -w net.core.rmem_max={}\n", identity_.process, shortage_,
+                           std::max(kReceiveBufferLimit, address_->receive_buffer));
 }
 
 void LcmLink::on_message(const lcm::ReceiveBuffer* buffer, const std::string&, Receiver* receiver) {
@@ -202,6 +212,8 @@ void LcmLink::report_health(Utime utime, std::int8_t state, const std::string& s
     message.state = std::max(state, own_state());
     message.state_text = state == health_t::OK ? trouble : std::format("{}; {}", state_text, trouble);
   }
+  // No trouble as long as nothing is lost, and that is counted by channel.
+  if (!shortage_.empty()) message.state_text += (message.state_text.empty() ? "" : "; ") + shortage_;
   const auto now = std::chrono::steady_clock::now();
   // A text may hold figures that change all the time. A bus that takes nothing is tried often, to be back early.
   const bool is_calm = message.state_text == last_state_text_ && !sends_.is_mute();

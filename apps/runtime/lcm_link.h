@@ -114,6 +114,7 @@ class LcmLink {
   };
 
   void subscribe_raw(Receiver& receiver, int queue_capacity);
+  void guard_socket();
   static void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel, Receiver* receiver);
   void take(std::span<const std::byte> data, Receiver& receiver);
   void refuse(Receiver& receiver, const std::string& reason, bool is_foreign);
@@ -134,6 +135,7 @@ class LcmLink {
   std::deque<Receiver> receivers_;  // a deque keeps addresses stable
   std::optional<BusAddress> address_;
   std::optional<BusSocket> socket_;
+  std::string shortage_;        // of the socket's buffer; empty when it has what was asked for
   std::exception_ptr failure_;  // of a handler; LCM's C code must not see it
   std::atomic<std::int64_t> failed_sends_ = 0;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();

@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Row M3: a map that lags. What waits on the bus meanwhile is bounded, and what found no place is asked for again."""
 
-import contextlib
-import ctypes
 import json
 import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ import numpy as np
 from ignis_lcm import ignis as types
 
 from map_drive import SCAN_PERIOD, SPEED, URL, Drive, hall_scan
+from stopped_thread import stopped_main_thread
 
 KEYFRAMES = 420  # more than the queue takes
 COPIES = 4000  # as when a back end that lags has them sent again and again
@@ -22,26 +20,6 @@ SPACING_M = 2.0
 PAUSE_S = 0.0005  # the receiving thread keeps up
 MAX_BACKLOG_MB = 40.0
 SECONDS = 20.0
-
-PTRACE_DETACH, PTRACE_SEIZE, PTRACE_INTERRUPT = 17, 0x4206, 0x4207
-
-
-@contextlib.contextmanager
-def stopped_main_thread(pid: int) -> Iterator[None]:
-    """The thread that handles messages stands still; the others, among them LCM's receiver, go on."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    libc.ptrace.argtypes = [ctypes.c_long] * 4
-
-    def trace(request: int) -> None:
-        assert libc.ptrace(request, pid, 0, 0) == 0, os.strerror(ctypes.get_errno())
-
-    trace(PTRACE_SEIZE)
-    trace(PTRACE_INTERRUPT)
-    os.waitpid(pid, 0)
-    try:
-        yield
-    finally:
-        trace(PTRACE_DETACH)
 
 
 def resident_mb(pid: int) -> float:
