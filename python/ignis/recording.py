@@ -2,11 +2,13 @@
 """A recording in progress: LCM's own logger, kept going over a full disk and its own death."""
 
 import argparse
+import contextlib
 import os
 import re
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 from datetime import datetime
 from pathlib import Path
@@ -25,16 +27,43 @@ _LEAST_LIFE_S = 2.0  # of a logger that is worth starting again
 _HEALTH_PERIOD_S = 1.0
 _ROOM_AGAIN = 1.2  # of --keep-free-mb
 _FLUSH_MS = 50  # that a killed logger may cost; LCM's default is 100
+_REFUSED = "lcm_eventlog_write_event: "  # the logger says so and goes on with the next message
 _DEFAULT_CONFIG = Path("config") / "ignis8_tuned.json"
+
+
+def refusal_by(folder: Path) -> str:
+    """Why nothing can be written into a folder; empty when it can. Leaves nothing behind."""
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            file.write(b"?")
+            os.fsync(file.fileno())
+    except OSError as error:
+        return os.strerror(error.errno or 0)
+    return ""
+
+
+def default_name(now: datetime) -> Path:
+    """A name that no file has: a clock that is set back, or without a clock chip, gives the same instant twice."""
+    name = first = Path(f"ignis-{now:%Y%m%d-%H%M%S}.lcmlog")
+    part = 2
+    while list(name.parent.glob(f"{name.name}*")):
+        name = _numbered(first, part)
+        part += 1
+    return name
+
+
+def _numbered(first: Path, part: int) -> Path:
+    return first.with_name(f"{first.stem}-{part}{first.suffix}")
 
 
 class Recording:
     """What is recorded into one file after another, and what is known about it.
 
     A new file begins when the logger was killed, when the file was removed, when a disk that was nearly full has room
-    again, and when a folder that was gone is back: what was written is left as it is. While the disk is too full or
-    the folder is gone HEALTH says FAULT; a logger that was killed is succeeded at once, a successor that ended at once
-    after two seconds. HEALTH says OK once a successor has lived that long.
+    again, when one that refused to be written to takes data again, and when a folder that was gone is back: what was
+    written is left as it is. While the disk is too full or refuses, or the folder is gone, HEALTH says FAULT; a logger
+    that was killed is succeeded at once, a successor that ended at once after two seconds. HEALTH says OK once a
+    successor has lived that long.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -43,7 +72,7 @@ class Recording:
         self.config = effective_config(options.config or checkout / _DEFAULT_CONFIG)
         default_url = os.environ.get("LCM_DEFAULT_URL") or self.config.get("lcm", {}).get("url", "")
         self.url: str = options.lcm_url or default_url
-        name = options.output or Path(f"ignis-{datetime.now():%Y%m%d-%H%M%S}.lcmlog")
+        name = options.output or default_name(datetime.now())
         self.output: Path = name.absolute()  # of a working folder that is removed nothing else would lead back
         self.folder = self.output.resolve().parent
         self._refuse_what_cannot_work()
@@ -52,6 +81,8 @@ class Recording:
         self.interruptions: list[str] = []
         self._first = self.output
         self._finished: list[Path] = []
+        self._said = ""  # by the logger
+        self._refused = False  # the disk did not take what the logger wrote
         self._number = 0
         self._health_sequence = 0
         self._told: tuple[int, str] | None = None
@@ -65,6 +96,9 @@ class Recording:
             self._command(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
             start_new_session=True,
         )  # fmt: skip
+        self._said = ""
+        assert self.logger.stderr is not None
+        os.set_blocking(self.logger.stderr.fileno(), False)
 
     def _refuse_what_cannot_work(self) -> None:
         options = self._options
@@ -83,6 +117,8 @@ class Recording:
             raise InputError(f"{self.output} is a folder; give the name of a file to write")
         if existing and options.split_mb is not None:
             raise InputError(f"{existing[0]} exists, and split recordings never overwrite; choose another name with -o")
+        if refusal := refusal_by(self.folder):
+            raise InputError(f"cannot write into {self.folder}: {refusal} ({self.free_mb():.0f} MB are free there)")
         if self.free_mb() < options.keep_free_mb:
             room = f"only {self.free_mb():.0f} MB are free in {self.folder}"
             raise InputError(f"{room}; --keep-free-mb is {options.keep_free_mb:.0f}")
@@ -147,7 +183,7 @@ class Recording:
             self._begin_next_file()
             self.paused = False
             self._tell_that_it_goes_on()
-            return f"there is room again; recording goes on in {self.file(0)}"
+            return f"the disk takes data again; recording goes on in {self.file(0)}"
         if obstacle is not None:
             self._tell(health_t.FAULT, f"recording paused: {obstacle}")
             self._end_logger()
@@ -155,7 +191,7 @@ class Recording:
             self.tail.close()
             self.paused = True
             self.interruptions.append(obstacle)
-            return f"{obstacle}: paused until there is room"
+            return f"{obstacle}: paused until that has changed"
         self.look()  # a split recording may have gone on, and its last part have been taken away
         if self.tail.is_lost():
             self._end_logger()
@@ -174,14 +210,32 @@ class Recording:
         keep = self._options.keep_free_mb
         if not self.folder.is_dir():
             return f"the folder {self.folder} is gone"
+        if not self.paused:
+            self._refused = _REFUSED in self._words_of_logger()
         if self.free_mb() < keep * (_ROOM_AGAIN if self.paused else 1.0):
             return f"the disk has less than {keep:.0f} MB left"
+        if self._refused and (refusal := self._refusal()):
+            return f"the disk of {self.folder} takes no data: {refusal}"
         return None
+
+    def _words_of_logger(self) -> str:
+        """All that it has said so far; a logger whose words nobody takes stands still in the end."""
+        assert self.logger.stderr is not None
+        with contextlib.suppress(BlockingIOError):
+            while words := os.read(self.logger.stderr.fileno(), 4096):
+                self._said += words.decode(errors="replace")
+        return self._said
+
+    def _refusal(self) -> str:
+        """Why the disk took nothing of what the logger wrote; empty when a new one is worth a try."""
+        if self.paused and time.monotonic() - self._started >= _LEAST_LIFE_S:
+            return refusal_by(self.folder)
+        return self._said.rpartition(_REFUSED)[2].partition("\n")[0] or "no reason was given"
 
     def _succeed_logger(self) -> str:
         """The logger has ended on its own. When it was the first one and ended at once, it cannot work at all."""
         code = self.logger.returncode
-        said = (self.logger.stderr.read() if self.logger.stderr else "").strip().splitlines()
+        said = self._words_of_logger().strip().splitlines()
         if not self.interruptions and time.monotonic() - self._started < _LEAST_LIFE_S:
             raise InputError(f"lcm-logger ended with code {code}: {(said or ['no message'])[-1]}")
         return self._interrupted(f"lcm-logger ended with code {code}")
@@ -197,7 +251,7 @@ class Recording:
         self._finished = self.files()
         self._number, part = 0, 2
         while True:
-            self.output = self._first.with_name(f"{self._first.stem}-{part}{self._first.suffix}")
+            self.output = _numbered(self._first, part)
             if not self.output.exists() and not self.file(0).exists():
                 break
             part += 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The drive that the fault tests share."""
+"""The drive and the libraries that the fault tests share."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -23,3 +24,28 @@ def undisturbed(drive_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Se
         run.seen.frontend_work = run.work("lio_frontend")
     assert len(run.seen.keyframes) >= 3 and set(run.seen.poses) == set(run.seen.keyframes)
     return run.seen
+
+
+def preloadable(name: str, folder: Path) -> Path:
+    """A library made of a C source that lies here."""
+    library = folder / f"{name}.so"
+    source = Path(__file__).resolve().parent / f"{name}.c"
+    subprocess.run(["cc", "-Wall", "-Werror", "-shared", "-fPIC", "-O1", source, "-o", library], check=True)
+    return library
+
+
+@pytest.fixture(scope="session")
+def stepped_clock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The library that moves the wall clock of whoever loads it."""
+    return preloadable("stepped_clock", tmp_path_factory.mktemp("clock"))
+
+
+@pytest.fixture
+def failing_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
+    """A folder, and the file that makes each write into it fail while it exists, to what is started from now on."""
+    folder, switch = tmp_path / "card", tmp_path / "broken"
+    folder.mkdir()
+    monkeypatch.setenv("LD_PRELOAD", str(preloadable("failing_disk", tmp_path)))
+    monkeypatch.setenv("FAILING_DISK", str(folder))
+    monkeypatch.setenv("FAILING_DISK_SWITCH", str(switch))
+    return folder, switch

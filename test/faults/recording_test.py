@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows L1 and P6 for the recorder: its disk fills, its folder or file is removed, or its logger is killed in mid-drive.
+"""Rows L1 and P6 for the recorder: its disk fills or breaks, its folder or file is removed, or its logger is killed.
 
 It goes on in a new file.
 """
@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from fault_drive import BUS, CONFIG
 from ignis.bus import Listener
 from ignis.log_config import recorded_config
 from ignis.logs import read_events
+from ignis.recording import default_name
 
 DISK_MB = 7
 KEEP_MB = 4
@@ -176,6 +178,46 @@ def test_fault_l1_a_recorder_whose_file_is_removed_goes_on_in_a_new_one(private_
     assert recorded_config(second) is not None and len(numbers(second)) > 10
 
 
+def test_fault_l1_a_recorder_whose_disk_breaks_says_so_and_goes_on_in_a_new_file_once_it_works(
+    private_network: None, failing_disk: tuple[Path, Path]
+) -> None:
+    folder, switch = failing_disk
+    log, second = folder / "drive.lcmlog", folder / "drive-2.lcmlog"
+    with Recorder(log) as recorder:
+        recorder.send_until(lambda: log.exists() and recorder.sent > 250)  # longer than a logger that ends at once
+        switch.touch()
+        took = recorder.send_until(lambda: recorder.says(health_t.FAULT))
+        said_at = recorder.sent
+        recorder.send_until(lambda: recorder.sent > said_at + 150)
+        assert not second.exists(), "one file, not one after the other that stays empty"
+        switch.unlink()
+        resumed = recorder.send_until(second.exists)
+        recorder.send_until(lambda: recorder.says(health_t.OK) and second.stat().st_size > 1_500_000)
+        code, said = recorder.end()
+    print(f"FAULT after {took:.2f} s, went on after {resumed:.2f} s")
+    assert took < FAULT_WITHIN_S + BUSY_S and resumed < RESUMED_WITHIN_S + BUSY_S
+    assert code == 3 and f"the disk of {folder} takes no data: Input/output error: paused" in said
+    early, late = numbers(log), numbers(second)
+    assert len(early) > 200 and len(late) > 10 and early[-1] < said_at < late[0]
+    assert recorded_config(second) is not None and {path.name for path in folder.iterdir()} == {log.name, second.name}
+
+
+def test_fault_l1_a_folder_that_nothing_can_be_written_to_is_refused_with_path_and_free_space(
+    private_network: None, tmp_path: Path
+) -> None:
+    folder = tmp_path / "read_only"
+    folder.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "ro,size=4m", "tmpfs", folder], check=True)
+    try:
+        with Recorder(folder / "drive.lcmlog") as recorder:
+            said, trouble = recorder.process.communicate(timeout=20)
+        assert recorder.process.returncode == 2 and "Traceback" not in trouble
+        assert f"cannot write into {folder}: Read-only file system (4 MB are free there)" in said + trouble
+        assert not list(folder.iterdir())
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
 def test_fault_p6_a_killed_logger_costs_the_recording_at_most_a_tenth_of_a_second(
     private_network: None, tmp_path: Path
 ) -> None:
@@ -249,3 +291,15 @@ def test_fault_p6_loggers_that_end_at_once_are_one_fault_until_one_goes_on(
         recorder.send_until(lambda: recorder.heard >= told + 3, seconds=3.0 + BUSY_S)
         code, _ = recorder.end()
     assert code == 3 and len(numbers(logs[-1])) > 10
+
+
+def test_fault_t1_a_recording_that_names_itself_never_meets_another_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    instant = datetime(2026, 1, 2, 3, 4, 5)
+    for _ in range(3):
+        default_name(instant).touch()  # as often as the clock is set back to it
+    Path("ignis-20260102-030406.lcmlog.00").touch()  # one that is split
+    assert default_name(instant.replace(second=6)) == Path("ignis-20260102-030406-2.lcmlog")
+    assert len(list(tmp_path.iterdir())) == 4

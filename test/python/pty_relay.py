@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wire between the simulated sensor and the driver that delays what passes, and into which a test can speak."""
 
+import contextlib
 import os
 import random
 import select
@@ -17,14 +18,18 @@ class PtyRelay:
     """Opens the sensor's port and offers its bytes on another one. A context manager: leaving it ends the wire.
 
     Every read from the sensor is held for a random time up to `most_delay_s`, as a busy reading loop would hold it.
+    What finds the host's buffer full waits; with `drops` it is lost, as on a serial line.
     """
 
-    def __init__(self, sensor: Path, host: Path, most_delay_s: float = 0.0, seed: int = 1) -> None:
+    def __init__(
+        self, sensor: Path, host: Path, most_delay_s: float = 0.0, seed: int = 1, *, drops: bool = False
+    ) -> None:
         self._most_delay_s = most_delay_s
         self._random = random.Random(seed)
         self._sensor = os.open(sensor, os.O_RDWR | os.O_NOCTTY)
         self._host, self._far_end = os.openpty()
         tty.setraw(self._far_end)
+        os.set_blocking(self._host, not drops)
         host.symlink_to(os.ttyname(self._far_end))
         self._link = host
         self._running = True
@@ -54,6 +59,7 @@ class PtyRelay:
                 if self._sensor in ready:
                     data = os.read(self._sensor, 4096)
                     time.sleep(self._random.uniform(0.0, self._most_delay_s))
-                    os.write(self._host, data)
+                    with contextlib.suppress(BlockingIOError):
+                        os.write(self._host, data)
             except OSError:
                 return  # the sensor is gone
