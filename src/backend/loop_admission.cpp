@@ -32,10 +32,14 @@ void wait_outside(GraphLoop loop, bool is_contradicted, SmootherState& state, Lo
   state.waiting.push_back(std::move(loop));
 }
 
+bool any_withdrawn(const LoopEvents& events) {
+  return std::ranges::contains(events, LoopReason::kWithdrawn,
+                               [](const GraphLoop& loop) { return loop.result.reason; });
+}
+
 /// Where loops have left the graph, those that it had contradicted before may fit now.
 void try_again_those_before(const LoopEvents& events, SmootherState& state) {
-  if (!std::ranges::contains(events, LoopReason::kWithdrawn, [](const GraphLoop& loop) { return loop.result.reason; }))
-    return;
+  if (!any_withdrawn(events)) return;
   for (GraphLoop& waiting : state.waiting) {
     if (!std::ranges::contains(events, waiting.number, &GraphLoop::number)) waiting.is_contradicted = false;
   }
@@ -239,11 +243,16 @@ LoopEvents admit_loop(const LoopResult& result, const WhiteningRows& rows, const
   const std::int32_t number = loop.number;
   state.waiting.push_back(std::move(loop));
   LoopEvents events;
-  LoopHearing hearing(config, state);
-  withdraw_outvoted(hearing, solver, state, events);
-  enter_believed(hearing, config, solver, state, events);
-  challenge(hearing.challengers(number), config, solver, state, events);
-  explain_waiting(hearing, state, events);
+  std::optional<LoopHearing> hearing(std::in_place, config, state);
+  withdraw_outvoted(*hearing, solver, state, events);
+  enter_believed(*hearing, config, solver, state, events);
+  if (any_withdrawn(events)) {
+    // Those that were outvoted come back where the graph without them contradicts the one that they had to yield to.
+    hearing.emplace(config, state);
+    enter_believed(*hearing, config, solver, state, events);
+  }
+  challenge(hearing->challengers(number), config, solver, state, events);
+  explain_waiting(*hearing, state, events);
   try_again_those_before(events, state);
   forget_oldest_waiting(state, events);
   return events;

@@ -32,6 +32,9 @@ LoopHearing::LoopHearing(const BackendConfig& config, SmootherState& state)
   for (const GraphLoop* loop : witnesses) {
     numbers_.push_back(loop->number);
     claims_.push_back(claim_of(*loop, state_));
+    // Of two sets of one size, that without what the graph contradicts: it could not enter.
+    const double doubt = loop->is_contradicted ? rule_.bounds.of(6) : 0.0;
+    costs_.push_back(doubt + test_against_odometry(claims_.back(), state_.odometry, rule_).value);
   }
   believe_largest_set();
 }
@@ -111,12 +114,10 @@ bool LoopHearing::agree(const GraphLoop& a, const GraphLoop& b) {
 
 void LoopHearing::believe_largest_set() {
   std::vector<std::vector<bool>> agreeing(claims_.size(), std::vector<bool>(claims_.size(), false));
-  std::vector<double> cost;
   for (std::size_t i = 0; i < claims_.size(); ++i) {
-    cost.push_back(test_against_odometry(claims_[i], state_.odometry, rule_).value);
     for (std::size_t k = 0; k < i; ++k) agreeing[i][k] = agreeing[k][i] = agree(i, k);
   }
-  believed_ = largest_agreeing_set(agreeing, cost);
+  believed_ = largest_agreeing_set(agreeing, costs_);
 }
 
 }  // namespace ignis

@@ -47,6 +47,7 @@ class LoopHearing {
   SmootherState& state_;
   std::vector<std::int32_t> numbers_;  ///< of the loops that testify
   std::vector<LoopClaim> claims_;      ///< theirs
+  std::vector<double> costs_;          ///< by which sets of one size differ
   std::vector<std::size_t> believed_;  ///< places in claims_, ascending
 };
 
