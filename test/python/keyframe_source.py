@@ -61,6 +61,7 @@ class Outcome:
     health: list[str] = field(default_factory=list)
     sent: int = 0
     dropped: int = 0
+    asked_again: list[set[int]] = field(default_factory=list)  # for each kill: keyframes that were sent again after it
 
     def distance(self, other: "Outcome") -> float:
         """Largest distance of a keyframe in both [m]; infinite when they do not hold the same ones."""
@@ -77,6 +78,8 @@ class BackendRun:
         self._keyframes = keyframes
         self._loss, self._random = loss, random.Random(seed)
         self._published = 0
+        self._dead_pid: int | None = None  # of the back end that was killed, until its successor is heard
+        self._may_miss = 0
         self._parts: dict[int, smoothed_keyframes_t] = {}
         self._arguments = ("--config", config, "--journal", folder / "journal")
         self._pipeline = Pipeline(folder, BUS)
@@ -98,7 +101,7 @@ class BackendRun:
                 if kills and now >= kills[0]:
                     kills.pop(0)
                     backend = self._kill(backend)
-                if self._published < len(self._keyframes) and now >= self._published * interval:
+                if self._published < len(self._keyframes) and now >= self._published * interval and self._is_heard():
                     self._send(self._published)
                     self._published += 1
                 self._pipeline.check()
@@ -114,7 +117,18 @@ class BackendRun:
         backend.send_signal(signal.SIGKILL)
         backend.wait()
         self.outcome.kills += 1
+        self.outcome.asked_again.append(set())
+        self._dead_pid = backend.pid
+        self._may_miss = int(self._published - 1 in self.outcome.poses)
         return self._start()
+
+    def _is_heard(self) -> bool:
+        """Whether the next keyframe may go. On the vehicle seconds lie between two of them and a restart takes less, so
+        it costs the one that was under way, or else one that comes meanwhile."""
+        if self._dead_pid is None:
+            return True
+        self._may_miss -= 1
+        return self._may_miss >= 0
 
     def _note_resume(self) -> None:
         said = self._pipeline.last_words("graph_backend")
@@ -144,6 +158,8 @@ class BackendRun:
         for number in keyframe_request_t.decode(data).ids:
             if number < self._published:
                 self._send(number)
+                if self.outcome.asked_again:
+                    self.outcome.asked_again[-1].add(number)
 
     def _on_revision(self, _: str, data: bytes) -> None:
         part = smoothed_keyframes_t.decode(data)
@@ -171,3 +187,5 @@ class BackendRun:
         health = health_t.decode(data)
         if health.process == "graph_backend":
             self.outcome.health.append(health.state_text)
+            if health.pid != self._dead_pid:
+                self._dead_pid = None

@@ -46,6 +46,8 @@ def test_killed_back_end_ends_with_the_same_graph(
     assert outcome.resumes, "no process said that it resumed"
     assert outcome.distance(undisturbed) < SAME_TRAJECTORY
     assert outcome.revision == undisturbed.revision
+    print("kills at", kills, "keyframes sent again", outcome.asked_again)
+    assert max(map(len, outcome.asked_again)) == 1, "whatever was in the graph is in the journal"
 
 
 @pytest.fixture
