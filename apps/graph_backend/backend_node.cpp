@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backend_node.h"
 
+#include <algorithm>
 #include <format>
 #include <iostream>
 #include <utility>
@@ -20,6 +21,9 @@ namespace channels = runtime::channels;
 
 constexpr int kPollMs = 100;
 constexpr int kCommandQueue = 100;
+// Parts of keyframes that wait in LCM while the solver is slow: 50 keyframes of an L1, 7 MB. LCM's buffer never
+// shrinks, and what finds no place is asked for again.
+constexpr int kMostWaitingParts = 200;
 constexpr Utime kSmoothedStatePeriod = 20'000;  // [us]
 constexpr std::chrono::seconds kFullPeriod{2};  // late joiners get the whole set within this time
 
@@ -51,8 +55,9 @@ BackendNode::BackendNode(const runtime::Application& application, const std::fil
   T_map_odom_ = graph_.smoother().T_map_odom();
   last_update_ = graph_.smoother().present();
   newest_utime_ = last_update_.newest.utime;
-  keyframe_counts_ = &link_.subscribe<keyframe_t>(channels::kKeyframe, config_.lcm.keyframe_queue,
-                                                  [this](const keyframe_t& part) { on_keyframe_part(part); });
+  keyframe_counts_ =
+      &link_.subscribe<keyframe_t>(channels::kKeyframe, std::min(config_.lcm.keyframe_queue, kMostWaitingParts),
+                                   [this](const keyframe_t& part) { on_keyframe_part(part); });
   state_counts_ = &link_.subscribe<state_t>(channels::kState, config_.lcm.imu_queue,
                                             [this](const state_t& message) { on_state(message); });
   link_.subscribe<graph_command_t>(

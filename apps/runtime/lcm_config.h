@@ -20,7 +20,7 @@ struct LcmConfig {
     visit.integer("imu_queue", self.imu_queue, {100, 100000}, "messages", "queue of L1_IMU; 5000 are 20 s");
     visit.integer("scan_queue", self.scan_queue, {1, 100000}, "messages", "queue of L1_SCAN, in parts");
     visit.integer("keyframe_queue", self.keyframe_queue, {10, 100000}, "messages",
-                  "queue of the keyframe channels; map_builder 300 at most");
+                  "queue of the keyframe channels; graph_backend 200, map_builder 300 at most");
     visit.integer("cloud_queue", self.cloud_queue, {1, 10000}, "messages",
                   "queue of LIO_CLOUD, in parts; 100 are 5 s of an L1");
     visit.integer("state_queue", self.state_queue, {1, 10000}, "messages",

@@ -9,7 +9,7 @@ import ignis_lcm.ignis as types
 
 from fault_drive import BUS, FaultRun
 from ignis.logs import read_log
-from stopped_thread import stopped_main_thread
+from slow_process import stopped_main_thread
 
 SCAN_QUEUE = 10
 SMALL_BUFFER = "recv_buf_size=524288"  # of the drive at twice its speed hardly a second

@@ -11,13 +11,16 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
+import ignis_lcm.ignis as types
 import numpy as np
 import pytest
 
 from fault_drive import CONFIG, SCENE
 from graph_listener import GraphListener, wait_until_equal
+from ignis.bus import open_bus
 from ignis.pipeline import Pipeline
 from seeded_relay import Disturbance, SeededRelay
+from slow_process import slowed_main_thread
 
 SEED = 20
 DRIVE_S = 60.0
@@ -27,6 +30,8 @@ NEAR = GROUP.format(port=7667)
 SAME_PLACE = 1e-3  # [m]
 THERE, BACK = ("LIO_KEYFRAME", "LIO_STATE"), ("KEYFRAME_REQUEST",)
 STOP_AT_S, STOP_FOR_S = 8.0, 10.0
+WORK_S, PAUSE_S = 0.001, 1.0  # of the slow back end, by turns
+STATES_PER_SAMPLE = (250 + 20) / 250  # one for each inertial sample and each scan
 
 
 @dataclass
@@ -46,14 +51,61 @@ def far_back_ends() -> dict[str, Far]:
         "30 % lost": Far(Disturbance(loss=0.30), ("lost", "LIO_KEYFRAME", 5)),
         "delayed, overtaking, doubled": Far(Disturbance(delay_s=0.1, duplicate=0.05), ("doubled", "LIO_KEYFRAME", 1)),
         "stopped": Far(Disturbance(), ("forwarded", "LIO_KEYFRAME", 20)),
+        "slow": Far(Disturbance(), ("forwarded", "LIO_KEYFRAME", 20)),
         "corrupted": Far(Disturbance(corrupt=0.02), ("corrupted", "LIO_STATE", 100)),
     }
+
+
+class SlowPhase:
+    """What is seen while a back end is stopped and another one slow, and until the slow one has caught up."""
+
+    def __init__(self, near: GraphListener, slow: GraphListener) -> None:
+        self.near, self.slow = near, slow
+        self.odometry = (0, 0)  # inertial samples in the phase, and states of the front end
+        self.behind = 0  # keyframes, in the end
+        self.told_ms = 0.0  # latency in HEALTH
+        self.ended_at = self.caught_up_s = float("inf")
+        self._newest = {"L1_IMU": b"", "LIO_STATE": b""}
+        self._bus = open_bus(NEAR)
+        for channel in self._newest:
+            self._bus.subscribe(channel, self._take).set_queue_capacity(20_000)
+
+    def _take(self, channel: str, data: bytes) -> None:
+        self._newest[channel] = data
+
+    def begin(self) -> None:
+        self._first = self._numbers()
+
+    def end(self) -> None:
+        last = self._numbers()
+        self.odometry = (last[0] - self._first[0], last[1] - self._first[1])
+        self.behind = len(self.near.poses) - len(self.slow.poses)
+        self.ended_at = time.monotonic()
+
+    def _drain(self) -> None:
+        while self._bus.handle_timeout(0) > 0:
+            pass
+
+    def look(self) -> None:
+        self._drain()
+        if time.monotonic() < self.ended_at or self.caught_up_s < float("inf"):
+            return
+        if self.slow.poses.keys() == self.near.poses.keys():
+            self.caught_up_s = time.monotonic() - self.ended_at
+            self.told_ms = max(self.slow.latencies_ms)
+
+    def _numbers(self) -> tuple[int, int]:
+        """The newest running numbers of inertial samples and of states."""
+        self._drain()
+        sample, state = self._newest.values()
+        return types.imu_t.decode(sample).sequence, types.state_t.decode(state).sequence
 
 
 @dataclass
 class Session:
     near: GraphListener
     far: dict[str, Far]
+    slow: SlowPhase
     alive: dict[str, bool] = field(default_factory=dict)
 
 
@@ -75,23 +127,32 @@ def session(private_network: None, tmp_path_factory: pytest.TempPathFactory) -> 
             each.listener = GraphListener(url)
             each.relay = stack.enter_context(SeededRelay(NEAR, url, THERE, BACK, each.disturbance, SEED + 2 * number))
             processes[name] = pipeline.start("graph_backend", *config)
-        result = Session(GraphListener(NEAR), far)
+        listener = GraphListener(NEAR)
+        result = Session(listener, far, SlowPhase(listener, far["slow"].listener))
         near.start("graph_backend", *config)
         near.start("lio_frontend", *config)
         time.sleep(2.0)
         player = near.start("lcm-logplayer", f"--speed={SPEED}", "--regexp=L1_.*", log)
         began = time.monotonic()
         listeners = [result.near, *(each.listener for each in far.values())]
-        stopped = processes["stopped"]
+        hindrance = ExitStack()
+        coming = [STOP_AT_S, STOP_AT_S + STOP_FOR_S]
         while player.poll() is None:
             passed = time.monotonic() - began
             assert passed < 5.0 * DRIVE_S, "the player hangs"
-            if STOP_AT_S < passed < STOP_AT_S + 1.0:
-                stopped.send_signal(signal.SIGSTOP)
-            elif passed > STOP_AT_S + STOP_FOR_S:
-                stopped.send_signal(signal.SIGCONT)
-            for listener in listeners:
-                listener.listen(0.05)
+            if coming and passed > coming[0]:
+                if len(coming) == 2:
+                    result.slow.begin()
+                    processes["stopped"].send_signal(signal.SIGSTOP)
+                    hindrance.callback(processes["stopped"].send_signal, signal.SIGCONT)
+                    hindrance.enter_context(slowed_main_thread(processes["slow"].pid, WORK_S, PAUSE_S))
+                else:
+                    result.slow.end()
+                    hindrance.close()
+                coming.pop(0)
+            for each in listeners:
+                each.listen(0.05)
+            result.slow.look()
         wait_until_equal([result.near, *(each.listener for name, each in far.items() if name != "corrupted")])
         near.check("l1_sim", "lcm-logplayer")
         result.alive = {name: process.poll() is None for name, process in processes.items()}
@@ -117,3 +178,16 @@ def test_fault_b5_altered_bits_on_the_way_end_no_back_end_and_poison_no_graph(se
     assert far.relay.count(kind, channel) >= at_least
     assert session.alive["corrupted"]
     assert far.listener.poses and all(np.isfinite(pose).all() for pose in far.listener.poses.values())
+
+
+def test_fault_g5_a_slow_solver_costs_the_odometry_nothing_is_told_and_catches_up(session: Session) -> None:
+    slow = session.slow
+    samples, states = slow.odometry
+    print(
+        f"slow for {STOP_FOR_S:.0f} s: {slow.behind} keyframes behind, told {slow.told_ms:.0f} ms, caught up after"
+        f" {slow.caught_up_s:.1f} s; {states} states of {samples} samples meanwhile"
+    )
+    assert slow.behind >= 2, "it was not slow"
+    assert samples > 0.8 * 250 * SPEED * STOP_FOR_S and abs(states - STATES_PER_SAMPLE * samples) < 0.02 * samples
+    assert slow.told_ms > 1e3 * PAUSE_S
+    assert slow.caught_up_s < STOP_FOR_S, "the phase and as long again"

@@ -11,7 +11,7 @@ import numpy as np
 from ignis_lcm import ignis as types
 
 from map_drive import SCAN_PERIOD, SPEED, URL, Drive, hall_scan
-from stopped_thread import stopped_main_thread
+from slow_process import stopped_main_thread
 
 KEYFRAMES = 420  # more than the queue takes
 COPIES = 4000  # as when a back end that lags has them sent again and again

@@ -5,7 +5,7 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from ignis_lcm.ignis import loop_result_t, smoothed_keyframes_t
+from ignis_lcm.ignis import health_t, loop_result_t, smoothed_keyframes_t
 
 from ignis.bus import open_bus
 
@@ -17,9 +17,11 @@ class GraphListener:
         self.loops: list[loop_result_t] = []
         self.poses: dict[int, np.ndarray] = {}
         self.revision = -1
+        self.latencies_ms: list[float] = []  # as the back ends tell them, once a second
         self._bus = open_bus(url)
         self._bus.subscribe("LOOP_RESULT", self._on_loop).set_queue_capacity(1000)
         self._bus.subscribe("SMOOTHED_KEYFRAMES", self._on_keyframes).set_queue_capacity(1000)
+        self._bus.subscribe("HEALTH", self._on_health)
 
     def listen(self, seconds: float) -> None:
         """Takes what comes for so long."""
@@ -44,6 +46,11 @@ class GraphListener:
 
     def _on_loop(self, _: str, data: bytes) -> None:
         self.loops.append(loop_result_t.decode(data))
+
+    def _on_health(self, _: str, data: bytes) -> None:
+        health = health_t.decode(data)
+        if health.process == "graph_backend":
+            self.latencies_ms.append(health.latency_ms)
 
     def _on_keyframes(self, _: str, data: bytes) -> None:
         part = smoothed_keyframes_t.decode(data)
