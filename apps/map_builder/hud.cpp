@@ -117,11 +117,9 @@ Json views_json(const std::map<double, SharedPicture>& pictures) {
 }
 
 Json stream_json(const StreamCounters& counters) {
-  Json json{{"snapshots", counters.snapshots.load()},
-            {"deltas", counters.deltas.load()},
-            {"frame_bytes", counters.frame_bytes.load()},
-            {"pictures_skipped", counters.pictures_skipped.load()},
-            {"resyncs", counters.resyncs.load()}};
+  Json json{{"snapshots", counters.snapshots.load()},     {"deltas", counters.deltas.load()},
+            {"frame_bytes", counters.frame_bytes.load()}, {"pictures_skipped", counters.pictures_skipped.load()},
+            {"resyncs", counters.resyncs.load()},         {"most_waiting_bytes", counters.most_waiting_bytes.load()}};
   json["refused"] = {{"bad_requests", counters.bad_requests.load()},
                      {"protocol_errors", counters.protocol_errors.load()},
                      {"binary_messages", counters.binary_messages.load()},

@@ -13,6 +13,7 @@ struct StreamCounters {
   std::atomic<std::int64_t> frame_bytes = 0;
   std::atomic<std::int64_t> pictures_skipped = 0;  ///< pictures that a viewer was too slow to get
   std::atomic<std::int64_t> resyncs = 0;
+  std::atomic<std::int64_t> most_waiting_bytes = 0;  ///< that waited at once for one viewer: its frame and its answers
 
   // What was refused. Those below the first close the connection with the code in brackets.
   std::atomic<std::int64_t> bad_requests = 0;

@@ -28,6 +28,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kNoThrow = net::as_tuple(net::use_awaitable);
 constexpr int kMaxBadRequests = 20;
 constexpr std::size_t kMaxAnswers = 64;
+constexpr std::size_t kMaxAnswerBytes = std::size_t{2} << 20;  // four pairs of the largest clouds of a loop
 constexpr double kRequestsPerSecond = 20.0;
 constexpr double kRequestBurst = 60.0;
 constexpr double kRadiusStep = 5.0;  // [m] viewers whose radii fall into one step share pictures and frames
@@ -52,7 +53,7 @@ net::awaitable<void> ViewClient::serve(const Request& upgrade) {
   if (refused) co_return;
   open_ = true;
   last_life_ = last_progress_ = Clock::now();
-  answers_.push_back({shared(context_.hello()), nullptr});
+  answer({shared(context_.hello()), nullptr});
   context_.on_view_changed();
   net::co_spawn(stream_.get_executor(), [self] { return self->write_loop(); }, kRethrow);
   co_await read_loop();
@@ -136,12 +137,19 @@ void ViewClient::handle(const std::string& text) {
 }
 
 void ViewClient::answer(Answer answer) {
-  if (answers_.size() >= kMaxAnswers) {
+  if (answers_.size() >= kMaxAnswers || answer_bytes_ + answer.bytes() > kMaxAnswerBytes) {
     too_demanding_ = true;
     return;
   }
+  answer_bytes_ += answer.bytes();
   answers_.push_back(std::move(answer));
+  note_waiting();
   wake();
+}
+
+void ViewClient::note_waiting() {
+  std::atomic<std::int64_t>& most = context_.counters.most_waiting_bytes;
+  most = std::max(most.load(), static_cast<std::int64_t>(answer_bytes_ + frame_bytes_));
 }
 
 void ViewClient::check_life(TimePoint now) {
@@ -170,6 +178,7 @@ net::awaitable<void> ViewClient::write_loop() {
     // A failed write ends the writing alone: the reader may be in the middle of telling the viewer why it is closed.
     if (!co_await (awaits_pong_ ? write_short_answers() : write_news())) {
       answers_.clear();
+      answer_bytes_ = frame_bytes_ = 0;
       answered_.cancel();
       co_return;
     }
@@ -221,6 +230,7 @@ net::awaitable<bool> ViewClient::write_answer() {
   const Answer answer = answers_.front();
   const bool written =
       co_await write_message(false, answer.text) && (!answer.binary || co_await write_message(true, answer.binary));
+  answer_bytes_ -= answer.bytes();
   answers_.pop_front();
   answered_.cancel();
   co_return written;
@@ -237,8 +247,11 @@ net::awaitable<bool> ViewClient::write_frame() {
   if (seen_.picture) context_.counters.pictures_skipped += picture->number - seen_.picture->number - 1;
   seen_.picture = picture;
   ++sequence_;
+  frame_bytes_ = frame.bytes->size();
+  note_waiting();
   if (!co_await write_message(false, shared(frame_text(*picture, frame.is_snapshot, sequence_)))) co_return false;
   if (!co_await write_message(true, frame.bytes)) co_return false;
+  frame_bytes_ = 0;
   ++(frame.is_snapshot ? context_.counters.snapshots : context_.counters.deltas);
   context_.counters.frame_bytes += static_cast<std::int64_t>(frame.bytes->size());
   co_return true;

@@ -39,12 +39,15 @@ struct ViewerContext {
 struct Answer {
   SharedBytes text;
   SharedBytes binary;
+
+  [[nodiscard]] std::size_t bytes() const { return text->size() + (binary ? binary->size() : 0); }
 };
 
 /// One viewer. It goes and comes with the board: write what is newest, send a ping behind it, wait for the pong, look
 /// again. So at most one batch is under way, whatever buffers lie between, and what a slow viewer gets was newest when
 /// its previous batch had arrived. A batch is texts and a frame; a viewer that takes long gets texts and frames in
-/// turn, so that no frame ages behind texts. All calls on the server's thread.
+/// turn, so that no frame ages behind texts. Answers that wait meanwhile are bounded in number and bytes: who asks for
+/// more than it reads is closed. All calls on the server's thread.
 class ViewClient : public std::enable_shared_from_this<ViewClient> {
  public:
   using Stream = boost::beast::websocket::stream<boost::beast::tcp_stream>;
@@ -79,6 +82,7 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   boost::asio::awaitable<bool> write_message(bool binary, SharedBytes message);
   void on_control(boost::beast::websocket::frame_type kind);
   void handle(const std::string& text);
+  void note_waiting();
   void count_failure(const boost::beast::error_code& error);
 
   std::int64_t id_;
@@ -89,7 +93,9 @@ class ViewClient : public std::enable_shared_from_this<ViewClient> {
   double view_radius_;
   ViewBoard::Seen seen_;
   std::deque<Answer> answers_;
-  std::int64_t sequence_ = 0;  // of the last frame sent
+  std::size_t answer_bytes_ = 0;  // of these
+  std::size_t frame_bytes_ = 0;   // of the frame that is being written
+  std::int64_t sequence_ = 0;     // of the last frame sent
   RateLimit requests_;
   int bad_requests_ = 0;
   bool too_demanding_ = false;  // asks faster than allowed, or does not read its answers

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map_builder/view_server.h"
 
-#include <algorithm>
 #include <chrono>
 #include <format>
+#include <optional>
 #include <tuple>
+#include <utility>
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -17,10 +18,9 @@
 
 #include "map/stream_encoding.h"
 #include "map_builder/listening_socket.h"
-#include "map_builder/request_rules.h"
+#include "map_builder/request_answers.h"
 #include "map_builder/rethrow.h"
 #include "map_builder/stream_options.h"
-#include "map_builder/web_files.h"
 
 namespace ignis {
 namespace {
@@ -41,24 +41,6 @@ constexpr int kSendBuffer = 256 * 1024;  // [bytes] per viewer in the kernel: mo
 constexpr double kHttpPerSecond = 100.0;
 constexpr double kHttpBurst = 300.0;
 constexpr std::chrono::seconds kWatchPeriod{1};
-constexpr char kStreamPath[] = "/ws/lio_map";
-constexpr char kStatusPath[] = "/api/status";
-
-http::response<http::string_body> make_response(http::status status, std::string_view type, std::string_view body) {
-  http::response<http::string_body> response(status, 11);
-  response.set(http::field::server, "ignis map_builder");
-  response.set(http::field::content_type, type);
-  response.set(http::field::cache_control, "no-cache");
-  response.set("X-Content-Type-Options", "nosniff");
-  response.set("Content-Security-Policy", "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'");
-  response.body() = body;
-  response.prepare_payload();
-  return response;
-}
-
-http::response<http::string_body> refusal(http::status status, std::string_view sentence) {
-  return make_response(status, "text/plain; charset=utf-8", std::string(sentence) + '\n');
-}
 
 /// Stops counting a connection when its coroutine ends, however it ends.
 class ConnectionCount {
@@ -225,38 +207,16 @@ ViewServer::Response ViewServer::answer(const Request& request) {
   if (!http_requests_.allow(std::chrono::steady_clock::now())) {
     return refusal(http::status::too_many_requests, "too many requests; try again in a second");
   }
-  if (!host_is_allowed(request[http::field::host], config_.allowed_origin)) {
-    return refusal(http::status::forbidden, "open the view by IP address or as localhost");
-  }
-  if (request.method() != http::verb::get && request.method() != http::verb::head) {
-    return refusal(http::status::method_not_allowed, "only GET is served");
-  }
-  if (request.target() == kStatusPath)
-    return make_response(http::status::ok, "application/json", *viewers_.board.api_status());
-  if (request.target() == kStreamPath) return refusal(http::status::upgrade_required, "this is a WebSocket");
-  const std::string_view target = request.target().substr(0, request.target().find('?'));
-  const auto files = web_files();
-  const auto file = std::ranges::find(files, target, &WebFile::path);
-  if (file == files.end()) return refusal(http::status::not_found, "no such page");
-  return make_response(http::status::ok, file->content_type, file->content);
+  return page_or_refusal(request, config_.allowed_origin, *viewers_.board.api_status());
 }
 
 ViewServer::Response ViewServer::refuse_upgrade(const Request& request, bool& refused) const {
-  refused = true;
-  const std::string_view host = request[http::field::host];
-  if (request.target() != kStreamPath) return refusal(http::status::not_found, "no such stream");
-  if (!host_is_allowed(host, config_.allowed_origin) ||
-      !origin_is_allowed(request[http::field::origin], host, config_.allowed_origin)) {
-    return refusal(http::status::forbidden, "this origin may not open the stream; see hmi.allowed_origin");
+  std::optional<Response> reason = refusal_of_stream(request, config_.allowed_origin);
+  if (!reason && std::ssize(clients_) >= config_.max_clients) {
+    reason = refusal(http::status::service_unavailable, "all viewer places are taken; try again later");
   }
-  if (!offers_protocol(request[http::field::sec_websocket_protocol], kStreamProtocol)) {
-    return refusal(http::status::bad_request, std::format("offer the subprotocol {}", kStreamProtocol));
-  }
-  if (std::ssize(clients_) >= config_.max_clients) {
-    return refusal(http::status::service_unavailable, "all viewer places are taken; try again later");
-  }
-  refused = false;
-  return {};
+  refused = reason.has_value();
+  return std::move(reason).value_or(Response{});
 }
 
 net::awaitable<void> ViewServer::serve_viewer(beast::tcp_stream stream, Request request) {
