@@ -36,6 +36,8 @@ struct LogInventory {
   Utime last_utime = 0;
 
   [[nodiscard]] bool damaged() const { return undecodable > 0 || damaged_bytes > 0 || incomplete_scans > 0; }
+  /// Some of what the sensors gave is not in the log.
+  [[nodiscard]] bool incomplete() const { return damaged() || missing_imu > 0 || missing_scans > 0; }
 };
 
 /// The measurements of a log, in the order of their own stamps per channel: under load LCM records out of order. The

@@ -14,8 +14,8 @@ namespace {
 std::string losses(const LogInventory& inventory) {
   std::string text;
   if (inventory.missing_imu + inventory.missing_scans > 0) {
-    text += std::format("missing:    {} IMU samples and {} scans by their running numbers\n", inventory.missing_imu,
-                        inventory.missing_scans);
+    text += std::format("missing:    {} IMU samples and {} scans by their running numbers: the log never held them\n",
+                        inventory.missing_imu, inventory.missing_scans);
   }
   if (inventory.out_of_order > 0) {
     text += std::format("order:      {} measurements were recorded late and put in the order of their stamps\n",

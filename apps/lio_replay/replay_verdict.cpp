@@ -26,7 +26,7 @@ runtime::ExitCode verdict(const ReplayResult& result, const LogInventory& invent
         runtime::kFailed);
   }
   if (stopped) return runtime::kFailed;
-  return inventory.damaged() || !refusals(result).empty() ? runtime::kInputDamaged : runtime::kDone;
+  return inventory.incomplete() || !refusals(result).empty() ? runtime::kInputDamaged : runtime::kDone;
 }
 
 }  // namespace ignis

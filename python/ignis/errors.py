@@ -9,6 +9,7 @@ from typing import Any
 
 EXIT_FAILURE = 1
 EXIT_BAD_INPUT = 2
+EXIT_DAMAGED = 3  # of a program that finished, though some of its input was damaged or lost
 EXIT_INTERRUPTED = 130
 
 
@@ -33,9 +34,9 @@ def run_command(body: Callable[[], int | None]) -> int:
         return EXIT_FAILURE
 
 
-def run_quietly(command: Sequence[Any]) -> None:
+def run_quietly(command: Sequence[Any], allowed: Sequence[int] = (0,)) -> None:
     """Runs a program whose output matters only when it fails; then its last line becomes the message."""
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
+    if done.returncode not in allowed:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise InputError(f"{command[0]} ended with code {done.returncode}: {last}")

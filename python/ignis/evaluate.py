@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ignis.errors import InputError, run_command, run_quietly
+from ignis.errors import EXIT_DAMAGED, InputError, run_command, run_quietly
 from ignis.evaluation.consistency import BAND, SIGMAS, band, inside_percent, nees_of, nis_of, silent_percent
 from ignis.evaluation.drives import Simulation, simulated
 from ignis.files import write_text
 from ignis.mounts import refuse_mounts
 from ignis.poses import read_tum
+from ignis.run_folder import losses_in, read_json
 from ignis.trajectory_error import errors_of, paired
 
 _CHECKOUT = Path(os.environ.get("IGNIS_CHECKOUT", "."))
@@ -72,8 +73,10 @@ def _replay(simulation: Simulation, variant: Variant, config: Path, folder: Path
     command = [binaries / "lio_replay", simulation.log, "--config", config, "--out", out]
     for change in variant.changes:
         command += ["--set", change]
-    run_quietly(command)
-    report = json.loads((out / "report.json").read_text())
+    run_quietly(command, (0, EXIT_DAMAGED))
+    report = read_json(out / "report.json")
+    if losses := losses_in(report):
+        print(f"WARNING: {simulation.log}: {losses}", file=sys.stderr, flush=True)
     truth = read_tum(simulation.truth)
     eskf = errors_of(paired(read_tum(out / "eskf.tum"), truth), per_scan=False)
     smoothed = errors_of(paired(read_tum(out / "smoothed.tum"), truth), per_scan=False)

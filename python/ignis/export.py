@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ignis import results
-from ignis.errors import InputError, run_command
+from ignis.errors import EXIT_DAMAGED, InputError, run_command
 from ignis.exporters.log_feed import feed_log
 from ignis.exporters.mcap_sink import McapSink
 from ignis.exporters.plain import write_log_tables, write_run_tables, write_trajectories
@@ -26,7 +26,7 @@ from ignis.files import replacing
 from ignis.importing import ImportChoice, detect
 from ignis.log_config import recorded_config
 from ignis.poses import Trajectory, make_trajectory
-from ignis.replay import EXIT_DAMAGED, replay
+from ignis.replay import replay
 from ignis.run_folder import Run, is_run, read_run
 
 _SUFFIX = {"mcap": ".mcap", "ros2": "_ros2", "tum": "_tum", "csv": "_csv", "g2o": ".g2o"}

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from ignis.errors import EXIT_FAILURE, EXIT_INTERRUPTED, InputError, run_command
+from ignis.errors import EXIT_DAMAGED, EXIT_FAILURE, EXIT_INTERRUPTED, InputError, run_command
 from ignis.files import write_text
 from ignis.importing import ImportChoice, add_choices, choice_of, detect, import_recording
 from ignis.log_config import differences, recorded_config
@@ -20,7 +20,6 @@ from ignis.mounts import mounts_among, set_options
 from ignis.pages.run_page import write_run_page
 from ignis.run_folder import read_run
 
-EXIT_DAMAGED = 3
 _IMPORTED_NAME = "input.lcmlog"
 _RECORDED_NAME = "recorded_config.json"
 _MOST_DIFFERENCES = 6

@@ -66,6 +66,19 @@ def read_run(folder: Path | str) -> Run:
     )
 
 
+def losses_in(report: dict[str, Any]) -> str:
+    """What the log of a replay lacks, in words; empty when it holds all that was measured."""
+    content = report["input"]
+    counts = [
+        (content["missing_imu"], "IMU samples missing"),
+        (content["missing_scans"], "scans missing"),
+        (content["incomplete_scans"], "scans with a part missing"),
+        (content["undecodable"], "messages undecodable"),
+        (content["damaged_bytes"], "bytes damaged"),
+    ]
+    return ", ".join(f"{count} {what}" for count, what in counts if count)
+
+
 def read_json(path: Path) -> dict[str, Any]:
     """One JSON object."""
     try:

@@ -185,6 +185,25 @@ def test_process_that_fails_is_reported_with_what_it_said_last() -> None:
     assert reason == "" and cost["peak_mb"] > 1.0
 
 
+def test_a_replay_of_a_recording_with_losses_is_judged_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    losses = {"missing_imu": 0, "missing_scans": 2, "incomplete_scans": 0, "undecodable": 0, "damaged_bytes": 7}
+    timing = {"scan_p50_ms": 1.0, "scan_p99_ms": 2.0, "wall_s": 1.0, "frontend": {"total_ms": 500.0}}
+    made = tmp_path / "made"
+    made.mkdir()
+    (made / "report.json").write_text(json.dumps({"input": losses, "timing": timing}))
+    for name in ("eskf.tum", "smoothed.tum"):
+        (made / name).write_text("1.0 0 0 0 0 0 0 1\n2.0 3 4 0 0 0 0 1\n")
+    program = tmp_path / "lio_replay"
+    program.write_text(f'#!/bin/sh\ncp -r {made} "$5"\nexit 3\n')
+    program.chmod(0o755)
+    drive = Drive("street", "spinning", None, Path("street.lcm"), tmp_path / "a.npz", None, 0.0)
+    for outcome_of_ours in systems.run_ours(program, drive, tmp_path / "config.json", tmp_path / "out", 0):
+        assert outcome_of_ours.figures["end_to_start_m"] == pytest.approx(5.0)
+    assert capsys.readouterr().err == "WARNING: street.lcm: 2 scans missing, 7 bytes damaged\n"
+
+
 def outcome(system: str, seed: int, **figures: object) -> Outcome:
     drive = Drive("hall", "l1", seed, Path(), Path(), Path())
     return Outcome(system, drive, figures)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ignis.errors import InputError
-from ignis.evaluate import Row, Variant, table
+from ignis.evaluate import Row, Variant, _row, table
 from ignis.evaluation.consistency import band, inside_percent, nees_of, nis_of, silent_percent
 from ignis.evaluation.drives import Simulation, changed_scene
 from ignis.poses import Poses, Trajectory, quaternion_from_matrix, rotation_matrix, write_tum
@@ -164,3 +164,28 @@ def test_table_names_what_failed_and_leaves_it_out_of_the_means() -> None:
     text = table([Row(drive, Variant("never"), {}, "start refused")])
     assert "| hall, 1 | never | failed: start refused |" in text
     assert "| hall | never |" not in text
+
+
+def test_a_drive_whose_log_lacks_samples_is_scored_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    replayed = tmp_path / "replayed"
+    truth = _replay(replayed, 1, 1.0)
+    (replayed / "smoothed.tum").write_bytes((replayed / "eskf.tum").read_bytes())
+    losses = {"missing_imu": 4, "missing_scans": 0, "incomplete_scans": 1, "undecodable": 0, "damaged_bytes": 0}
+    counts = {"scans": 9, "scans_applied": 9, "scans_with_unobserved_directions": 0, "loops_kept": 0}
+    timing = {"scan_p50_ms": 1.0, "scan_p99_ms": 2.0}
+    (replayed / "report.json").write_text(json.dumps({"input": losses, "timing": timing, **counts}))
+    states = (replayed / "eskf_states.csv").read_text().splitlines()
+    trusted = [states[0] + ",trust", *(row + ",0" for row in states[1:])]
+    (replayed / "eskf_states.csv").write_text("\n".join(trusted) + "\n")
+    write_tum(tmp_path / "drive.tum", truth)
+    for code, problem in ((3, ""), (1, "ended with code 1")):
+        program = tmp_path / f"binaries{code}" / "lio_replay"
+        program.parent.mkdir()
+        program.write_text(f'#!/bin/sh\ncp -r {replayed} "$5"\nexit {code}\n')
+        program.chmod(0o755)
+        drive = Simulation("hall", code, tmp_path / "drive.lcmlog", tmp_path / "drive.tum")
+        row = _row(drive, Variant("tuned"), tmp_path / "config.json", tmp_path, program.parent)
+        assert problem in row.problem and bool(row.problem) == bool(problem), row.problem
+    assert capsys.readouterr().err == f"WARNING: {drive.log}: 4 IMU samples missing, 1 scans with a part missing\n"

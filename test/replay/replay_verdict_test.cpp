@@ -48,6 +48,18 @@ TEST(ReplayVerdict, IsDoneWhereGraphAndMapTookEverything) {
   EXPECT_EQ(verdict(result, damaged_log(), false), runtime::kInputDamaged);
 }
 
+TEST(ReplayVerdict, IsNotDoneWhereTheRunningNumbersOfTheLogHaveGaps) {
+  const ReplayResult result = follow({scan_with_keyframe(0), scan_with_keyframe(1)});
+  LogInventory inventory;
+  inventory.out_of_order = 5;  // costs nothing
+  EXPECT_EQ(verdict(result, inventory, false), runtime::kDone);
+  inventory.missing_imu = 1;
+  EXPECT_EQ(verdict(result, inventory, false), runtime::kInputDamaged);
+  inventory.missing_imu = 0;
+  inventory.missing_scans = 1;
+  EXPECT_EQ(verdict(result, inventory, false), runtime::kInputDamaged);
+}
+
 TEST(ReplayVerdict, IsNotDoneWhereTheGraphRefusedAKeyframeInWhateverSession) {
   std::vector<ScanResult> scans{scan_with_keyframe(0), scan_with_keyframe(1), scan_with_keyframe(2)};
   scans[1].keyframe->state.v_odom.x() = std::numeric_limits<double>::quiet_NaN();

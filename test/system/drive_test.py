@@ -15,8 +15,10 @@ from live_agreement import require_equal_up_to_the_first_drop
 
 from ignis import results
 from ignis.compare import comparison
+from ignis.errors import EXIT_DAMAGED
 from ignis.log_config import recorded_config
 from ignis.pipeline import Pipeline, effective_config
+from ignis.run_folder import losses_in
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
@@ -108,8 +110,9 @@ def test_replay_of_the_recording_equals_the_live_run(drive: Drive, run_binary, t
     reports = []
     for name in ("first", "second"):
         done = run_binary("lio_replay", drive.log, "--config", CONFIG, "--out", tmp_path / name, seconds=120)
-        assert done.returncode == 0, done.stdout
         reports.append(json.loads((tmp_path / name / "report.json").read_text()))
+        # A busy machine loses datagrams, in the recorder as well.
+        assert done.returncode == (EXIT_DAMAGED if losses_in(reports[-1]) else 0), done.stdout
     assert reports[0]["trajectory_hash"] == reports[1]["trajectory_hash"]
     assert reports[0]["map_hash"] == reports[1]["map_hash"]
     for file in ("eskf.tum", "smoothed.tum", "keyframes.g2o", "map.pcd", "map.ply", "scan_stats.csv", "loops.csv"):

@@ -20,6 +20,7 @@ from nbclient import NotebookClient
 from playwright.sync_api import sync_playwright
 
 from ignis import read_log
+from ignis.errors import EXIT_DAMAGED
 from ignis.log_config import CONFIG_CHANNEL, encoded
 from ignis.logs import LogWriter, read_events
 from ignis.mounts import read_extrinsics
@@ -136,6 +137,22 @@ def test_a_truncated_tail_and_a_gap_are_named_and_survived(logs: list[Path], tmp
     assert said["first_drop"]["what"] == "5 of L1_IMU missing in the log"
     assert said["first_drop"]["s"] == pytest.approx(1498 / 250, abs=0.003)
     assert "first drop: at 5.99" in done.stdout
+
+
+def test_a_whole_log_whose_numbers_have_gaps_ends_with_3_and_says_what_it_never_held(
+    logs: list[Path], tmp_path: Path
+) -> None:
+    log = tmp_path / "gaps.lcmlog"
+    with LogWriter(log) as writer:
+        for number, event in enumerate(read_events(logs[0])):
+            if number not in (2000, 2001) and not (event.channel == "L1_SCAN" and 3000 < number < 3100):
+                writer.write(event.utime, event.channel, event.data)
+    done = ignis("replay", log, "--config", CONFIG, "--out", tmp_path / "a", "--no-page", "--until", SECONDS)
+    said = report(tmp_path / "a")["input"]
+    assert said["damaged_bytes"] == said["undecodable"] == said["incomplete_scans"] == 0
+    lost = f"{said['missing_imu']} IMU samples and {said['missing_scans']} scans by their running numbers"
+    assert said["missing_imu"] > 0 and said["missing_scans"] > 0
+    assert done.returncode == EXIT_DAMAGED and f"missing:    {lost}: the log never held them" in done.stdout
 
 
 def test_the_page_says_in_words_what_was_refused(logs: list[Path], tmp_path: Path) -> None:

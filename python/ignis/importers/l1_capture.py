@@ -6,7 +6,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from ignis.errors import InputError
+from ignis.errors import EXIT_DAMAGED, InputError
 from ignis.logs import LogDamage, LogWriter, read_log
 from ignis.mounts import set_options
 
@@ -14,7 +14,6 @@ from ignis.mounts import set_options
 _MAGIC, _HEADER_BYTES, _FRAME_OVERHEAD = 0xFD, 10, 12
 _SENSOR_MESSAGES = (13, 16, 17, 18, 19)
 _PROBE_BYTES = 1 << 16
-_DAMAGED = 3  # the driver's exit code: the log holds what was sound
 
 
 def is_capture(head: bytes) -> bool:
@@ -41,11 +40,11 @@ def import_capture(path: Path, config: Path, output: Path, changes: Sequence[str
     command = [str(driver), "--capture", str(path), "--config", str(config), *set_options(changes)]
     try:
         run = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-        if run.returncode not in (0, _DAMAGED) or not decoded.is_file() or decoded.stat().st_size == 0:
+        if run.returncode not in (0, EXIT_DAMAGED) or not decoded.is_file() or decoded.stat().st_size == 0:
             reason = run.stderr.strip().removeprefix("l1_driver: ") or "the driver found nothing in it"
             raise InputError(f"cannot import {path}: {reason}")
         remarks = _write_in_order(decoded, output, path)
-        if run.returncode == _DAMAGED:
+        if run.returncode == EXIT_DAMAGED:
             remarks.append(run.stderr.strip().removeprefix("l1_driver: "))
         return remarks
     finally:

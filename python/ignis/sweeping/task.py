@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ignis import trajectory_error
-from ignis.errors import InputError
+from ignis.errors import EXIT_DAMAGED, InputError
 from ignis.evaluation.consistency import nees_of
 from ignis.files import write_text
 from ignis.poses import Trajectory, read_tum
@@ -98,7 +98,7 @@ def _truth(task: Task, folder: Path) -> Trajectory | None:
 
 
 def _replay(task: Task, folder: Path) -> str:
-    """Why the replay failed; empty when it did not. Damaged input (exit code 3) still gives results."""
+    """Why the replay failed; empty when it did not. Damaged or lost input still gives results."""
     program = Path(os.environ.get("IGNIS_BUILD", ".")) / "bin" / "lio_replay"
     command = [str(program), task.log, "--config", task.config, "--out", str(folder), *task.options]
     for key, value in task.changes:
@@ -111,7 +111,7 @@ def _replay(task: Task, folder: Path) -> str:
     finally:
         with _lock:
             _running.discard(process)
-    if process.returncode in (0, 3):
+    if process.returncode in (0, EXIT_DAMAGED):
         return ""
     return f"lio_replay ended with code {process.returncode}: {complaint_in(said)}"
 
