@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Configurations and scenes from strangers: a text is refused with a message that is itself plain text, or gives values
-// that are within their ranges, print, and load again to the same. The first byte chooses what the text is.
+// that are within their ranges, print, and load again to the same. The first byte chooses what the text is: three
+// sections by themselves, which the fuzzer sees through sooner than the whole file, a scene, or that file.
 
 #include <cstdint>
 #include <string>
@@ -12,6 +13,7 @@
 #include "drivers/sim/scene_config.h"
 #include "map/map_config.h"
 #include "require.h"
+#include "runtime/ignis_config.h"
 
 namespace {
 
@@ -35,7 +37,7 @@ void check(const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
-  switch (data[0] % 4) {
+  switch (data[0] % 5) {
     case 0:
       check<DriverConfig>(text);
       break;
@@ -45,8 +47,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 2:
       check<Extrinsics>(text);
       break;
-    default:
+    case 3:
       check<sim::SceneConfig>(text);
+      break;
+    default:
+      check<runtime::IgnisConfig>(text);
   }
   return 0;
 }

@@ -1,28 +1,52 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Bytes that a client may send as an HTTP request, through the parser that the server uses and through its rules of who
-// may talk to it. The rules are told once more here, from the other side.
+// Bytes that a client may send as an HTTP request, through the parser that the server uses, its rules of who may talk
+// to it, and its answers. The rules are told once more here, from the other side. Each input is a target of its own as
+// well: few bytes are a whole request.
 
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <span>
+#include <sstream>
 #include <string>
 #include <string_view>
 
 #include <boost/asio/buffer.hpp>
-#include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 
 #include "map/stream_encoding.h"
+#include "map_builder/request_answers.h"
 #include "map_builder/request_rules.h"
+#include "map_builder/web_files.h"
 #include "require.h"
+
+namespace ignis {
+namespace {
+
+constexpr WebFile kFiles[] = {{"/", "text/html", "the page"},
+                              {"/view.js", "text/javascript", "its program"},
+                              {"/icon.svg", "image/svg+xml", "its icon"}};
+
+}  // namespace
+
+/// In place of the table that is made of the bundled page.
+std::span<const WebFile> web_files() { return kFiles; }
+
+}  // namespace ignis
 
 namespace {
 
 using namespace ignis;
 using fuzz::require;
 namespace http = boost::beast::http;
+
+constexpr char kStatus[] = "the status";
 
 std::string lower(std::string_view text) {
   std::string result(text);
@@ -57,6 +81,49 @@ void judge_protocol(std::string_view header) {
   require(!offers_protocol(header, kStreamProtocol) || header.contains(kStreamProtocol));
 }
 
+/// Only what is listed is served, and only under its own name; everything else is 4xx.
+void judge_answer(const HttpRequest& request, const HttpResponse& response) {
+  const std::string_view target = request.target();
+  if (response.result() != http::status::ok) {
+    require(http::to_status_class(response.result()) == http::status_class::client_error);
+  } else if (response.body() == kStatus) {
+    require(target == "/api/status");
+  } else {
+    const auto file = std::ranges::find(kFiles, response.body(), &WebFile::content);
+    require(file != std::end(kFiles) && target.substr(0, target.find('?')) == file->path);
+  }
+}
+
+/// No byte of a request gets into an answer: those of one kind are equal, head and all, whoever asks for what.
+void judge_bytes(const HttpResponse& response) {
+  constexpr std::size_t kKinds = 11;  // three files, the status, seven refusals
+  static std::map<std::string, std::string> seen;
+  std::ostringstream written;
+  written << response;
+  const auto [known, is_new] = seen.try_emplace(response.body(), written.str());
+  require(known->second == written.str() && seen.size() <= kKinds);
+}
+
+void judge_answers(const HttpRequest& request) {
+  const HttpResponse page = page_or_refusal(request, "", kStatus);
+  judge_answer(request, page);
+  judge_bytes(page);
+  const std::optional<HttpResponse> refused = refusal_of_stream(request, "");
+  if (refused) {
+    judge_bytes(*refused);
+  } else {
+    require(request.target() == "/ws/lio_map" && host_is_allowed(request[http::field::host], ""));
+  }
+}
+
+/// A request for `target` that breaks no other rule.
+HttpRequest request_for(std::string_view target) {
+  HttpRequest request(http::verb::get, target, 11);
+  request.set(http::field::host, "localhost:8080");
+  request.set(http::field::sec_websocket_protocol, kStreamProtocol);
+  return request;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -70,10 +137,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     judge_origin(request[http::field::origin], request[http::field::host]);
     judge_protocol(request[http::field::sec_websocket_protocol]);
     static_cast<void>(boost::beast::websocket::is_upgrade(request));
+    judge_answers(request);
   }
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   judge_host(text);
   judge_origin(text, text.substr(0, size / 2));
   judge_protocol(text);
+  judge_answers(request_for(text));
   return 0;
 }

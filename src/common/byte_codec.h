@@ -34,6 +34,7 @@ class ByteWriter {
   explicit ByteWriter(std::vector<std::byte>& bytes) : bytes_(bytes) {}
 
   void number(const Number auto& value) { raw(&value, sizeof value); }
+  void number_below(const std::unsigned_integral auto& value, std::uint64_t /*end*/) { number(value); }
   void text(const std::string& value) {
     number(static_cast<std::uint32_t>(value.size()));
     raw(value.data(), value.size());
@@ -82,6 +83,13 @@ class ByteReader {
     } else {
       raw(&value, sizeof value);
     }
+  }
+  /// One that is used as an index: from `end` on it is impossible, and 0.
+  void number_below(std::unsigned_integral auto& value, std::uint64_t end) {
+    number(value);
+    if (value < end) return;
+    failed_ = true;
+    value = 0;
   }
   void text(std::string& value) {
     const std::size_t size = count(1);

@@ -197,7 +197,7 @@ class LocalMap {
   /// Taken voxels alone, each in one go: there are many.
   friend void transfer(auto& io, FieldsOf<Block> auto& block) {
     io.matrix(block.coordinate);
-    io.number(block.face);
+    io.number_below(block.face, kFaces);
     io.number(block.occupied);
     io.number(block.confirmed);
     for (std::uint64_t left = block.occupied; left != 0; left &= left - 1) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace ignis {
 namespace {
 
@@ -29,6 +31,15 @@ TEST(RecordedDrop, IsNoLossThatOthersMend) {
   EXPECT_EQ(loss_in(health("lio_frontend", "L1_IMU", 0, 0)), "");
   EXPECT_EQ(loss_in(health("graph_backend", "L1_IMU", 3, 0)), "");
   EXPECT_EQ(loss_in(health("lio_frontend", "KEYFRAME_REQUEST", 3, 0)), "");
+}
+
+TEST(RecordedDrop, TakesAnyCountForOne) {
+  constexpr std::int64_t kLeast = std::numeric_limits<std::int64_t>::min();
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  EXPECT_EQ(loss_in(health("lio_frontend", "L1_IMU", kLeast, kLeast)), "");
+  EXPECT_NE(loss_in(health("lio_frontend", "L1_IMU", kMost, kMost)).find("missed 6148914691236517204"),
+            std::string::npos);
+  EXPECT_NE(loss_in(health("lio_frontend", "L1_IMU", kLeast, 2)).find("missed 2 messages"), std::string::npos);
 }
 
 TEST(RecordedDrop, OfTwoTheEarlierCounts) {
