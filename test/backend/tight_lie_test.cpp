@@ -57,7 +57,7 @@ struct Laps {
 /// The same with a lie behind keyframe `from`, and some keyframes more.
 class LiedTo {
  public:
-  LiedTo(const Laps& laps, int from, const Vector6d& off) : laps_(laps), from_(from) {
+  LiedTo(const Laps& laps, int from, const Vector6d& off) : from_(from) {
     for (int id = 0; id <= from + kKeyframesBehind; ++id) {
       const Keyframe& keyframe = laps.drive.keyframes[static_cast<std::size_t>(id)];
       now_ = keyframe.state.utime;
@@ -101,7 +101,6 @@ class LiedTo {
     }
   }
 
-  const Laps& laps_;
   int from_;
   Smoother smoother_{testing::without_search(kKeyframes), LoopGates()};
   Published published_;
