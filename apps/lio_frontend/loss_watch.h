@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <format>
@@ -9,8 +10,9 @@
 
 namespace ignis {
 
-/// How much of a channel was lost lately. A tenth costs hardly any accuracy; where a sixth goes astray a network or a
-/// computer is at its end, and what comes next is not known.
+/// How much of a channel was lost lately. A tenth costs hardly any accuracy; where more than a sixth goes astray,
+/// beyond what chance makes of less, a network or a computer is at its end, and what comes next is not known. It is
+/// told until little is lost any more, so that it does not come and go.
 class LossWatch {
  public:
   explicit LossWatch(std::string channel) : channel_(std::move(channel)) {}
@@ -18,25 +20,26 @@ class LossWatch {
   /// Takes the counts so far, at `now_s` of a clock that nobody sets.
   void look(double now_s, std::int64_t heard, std::int64_t lost) {
     if (!looks_.empty() && now_s - looks_.back().at_s < kStep_s) return;
+    // More than any sensor sends: another sender with other numbers, or a jump in a log. Nothing is known of losses.
+    if (lost - counted_ > kMostAtOnce) looks_.clear();
+    counted_ = lost;
     looks_.push_back({now_s, heard, lost});
     while (looks_.size() > 2 && looks_[1].at_s <= now_s - kLately_s) looks_.pop_front();
+    judge();
   }
 
   /// What to tell, as of the newest look; empty when few enough were lost.
   [[nodiscard]] std::string trouble() const {
-    if (looks_.empty()) return {};
-    const std::int64_t lost = looks_.back().lost - looks_.front().lost;
-    const std::int64_t sent = looks_.back().heard - looks_.front().heard + lost;
-    const double share = sent > 0 ? static_cast<double>(lost) / static_cast<double>(sent) : 0.0;
-    if (lost < kFewLost || share <= kMaxShare) return {};
-    return std::format("{}: {} of the last {} lost", channel_, lost, sent);
+    return is_trouble_ ? std::format("{}: {} of the last {} lost", channel_, lost_, sent_) : std::string();
   }
 
  private:
   static constexpr double kStep_s = 0.25;
-  static constexpr double kLately_s = 3.0;
+  static constexpr double kLately_s = 5.0;
   static constexpr double kMaxShare = 0.15;
-  static constexpr std::int64_t kFewLost = 5;
+  static constexpr double kShareToEnd = 0.08;
+  static constexpr double kFewLost = 5.0;
+  static constexpr std::int64_t kMostAtOnce = 5000;
 
   struct Look {
     double at_s;
@@ -44,8 +47,21 @@ class LossWatch {
     std::int64_t lost;
   };
 
+  void judge() {
+    lost_ = looks_.back().lost - looks_.front().lost;
+    sent_ = looks_.back().heard - looks_.front().heard + lost_;
+    const auto lost = static_cast<double>(lost_);
+    const auto sent = static_cast<double>(sent_);
+    is_trouble_ =
+        is_trouble_ ? lost > kShareToEnd * sent : lost >= kFewLost && lost > kMaxShare * sent + std::sqrt(sent);
+  }
+
   std::string channel_;
   std::deque<Look> looks_;
+  std::int64_t counted_ = 0;
+  std::int64_t lost_ = 0;
+  std::int64_t sent_ = 0;
+  bool is_trouble_ = false;
 };
 
 }  // namespace ignis

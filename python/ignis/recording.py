@@ -83,6 +83,7 @@ class Recording:
         self._finished: list[Path] = []
         self._said = ""  # by the logger
         self._refused = False  # the disk did not take what the logger wrote
+        self._full = False
         self._number = 0
         self._health_sequence = 0
         self._told: tuple[int, str] | None = None
@@ -212,7 +213,8 @@ class Recording:
             return f"the folder {self.folder} is gone"
         if not self.paused:
             self._refused = _REFUSED in self._words_of_logger()
-        if self.free_mb() < keep * (_ROOM_AGAIN if self.paused else 1.0):
+        self._full = self.free_mb() < keep * (_ROOM_AGAIN if self._full else 1.0)
+        if self._full:
             return f"the disk has less than {keep:.0f} MB left"
         if self._refused and (refusal := self._refusal()):
             return f"the disk of {self.folder} takes no data: {refusal}"

@@ -49,10 +49,10 @@ const ScanSelection& ScanSelector::select(const Scan& scan) {
 std::span<const ScanPoint> ScanSelector::bounded(std::span<const ScanPoint> points) {
   const std::size_t most = voxel_ > 0.0 ? kMostToThin : kMostToKeep;
   if (points.size() <= most) return points;
-  const std::size_t step = (points.size() + most - 1) / most;
-  every_nth_.clear();
-  for (std::size_t i = 0; i < points.size(); i += step) every_nth_.push_back(points[i]);
-  return every_nth_;
+  // By a fraction: where points come column by column, a whole step would leave out the same beams again and again.
+  some_.clear();
+  for (std::size_t i = 0; i < most; ++i) some_.push_back(points[i * points.size() / most]);
+  return some_;
 }
 
 }  // namespace ignis

@@ -19,8 +19,9 @@ struct ScanSelection {
 
 /// Drops what is not finite or out of range. A scan that still has more than max_scan_points is then thinned to one
 /// point per voxel of scan_voxel_m (0: not at all), before anything is spent on its points: at 130,000 a scan, moving
-/// each of them to the scan's end and into the map costs more than matching. Of a scan that no LiDAR makes every n-th
-/// point is looked at, so that its cost is bounded. Keeps its memory from scan to scan.
+/// each of them to the scan's end and into the map costs more than matching. Of more than a million points, or of
+/// 150,000 where none are thinned, some are looked at, evenly, so that the cost of a scan is bounded. Keeps its memory
+/// from scan to scan.
 class ScanSelector {
  public:
   /// Of `config`, the four fields named above.
@@ -30,7 +31,7 @@ class ScanSelector {
   [[nodiscard]] const ScanSelection& select(const Scan& scan);
 
  private:
-  /// All of them, or every n-th of too many.
+  /// All of them, or of too many some, evenly.
   [[nodiscard]] std::span<const ScanPoint> bounded(std::span<const ScanPoint> points);
 
   double nearest2_;   ///< [m^2]
@@ -38,7 +39,7 @@ class ScanSelector {
   double voxel_;      ///< [m]
   int max_points_;
   VoxelThinner thinner_;
-  std::vector<ScanPoint> every_nth_;
+  std::vector<ScanPoint> some_;
   ScanSelection selection_;
 };
 

@@ -70,17 +70,19 @@ TEST(ScanSelection, LeavesOneMeasuredPointPerVoxelOfALargeScan) {
   EXPECT_EQ(ScanSelector(config).select(scan).scan.points.size(), static_cast<std::size_t>(selection.in_range));
 }
 
-TEST(ScanSelection, LooksAtEveryNthPointOfAScanThatNoLidarMakes) {
+TEST(ScanSelection, LooksAtABoundedNumberOfPointsFromAllOfALargeScan) {
   FrontendConfig config;
   const Scan scan = random_scan(1'600'000);
   ScanSelector selector(config);
   const ScanSelection& selection = selector.select(scan);
-  EXPECT_EQ(selection.unread, 1'600'000 - 145'455);
+  EXPECT_EQ(selection.unread, 1'600'000 - 150'000);
   EXPECT_LE(selection.in_range + selection.unread, 1'600'000);
   EXPECT_EQ(selection.scan.points.size(), static_cast<std::size_t>(selection.in_range));
-  for (const ScanPoint& point : selection.scan.points) ASSERT_EQ(point.dt_us % 11, 0) << "from all of the scan";
+  for (std::size_t i = 1; i < selection.scan.points.size(); ++i) {
+    ASSERT_LT(selection.scan.points[i].dt_us - selection.scan.points[i - 1].dt_us, 200) << "from all of the scan";
+  }
   config.scan_voxel_m = 1.0;
-  EXPECT_EQ(ScanSelector(config).select(scan).unread, 800'000) << "what is thinned at once costs less";
+  EXPECT_EQ(ScanSelector(config).select(scan).unread, 600'000) << "what is thinned at once costs less";
   EXPECT_EQ(ScanSelector(config).select(random_scan(262'144)).unread, 0);
 }
 

@@ -42,7 +42,10 @@ class Flood(threading.Thread):
     def run(self) -> None:
         began = time.monotonic()
         while time.monotonic() < self._end:
-            status, peer = self._server.upgrade()
+            try:
+                status, peer = self._server.upgrade()
+            except (OSError, IndexError):  # the server has no ear for one that was thrown out a moment ago
+                continue
             self.connections += status == 101
             try:
                 while not self._is_thrown_out(peer) and (now := time.monotonic()) < self._end:

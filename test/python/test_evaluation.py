@@ -172,6 +172,7 @@ def test_a_drive_whose_log_lacks_samples_is_scored_with_a_warning(
     replayed = tmp_path / "replayed"
     truth = _replay(replayed, 1, 1.0)
     (replayed / "smoothed.tum").write_bytes((replayed / "eskf.tum").read_bytes())
+    (replayed / "scan_stats.csv").write_text("utime,applied,nis,nis_directions\n1,1,3.0,6.0\n")
     losses = {"missing_imu": 4, "missing_scans": 0, "incomplete_scans": 1, "undecodable": 0, "damaged_bytes": 0}
     counts = {"scans": 9, "scans_applied": 9, "scans_with_unobserved_directions": 0, "loops_kept": 0}
     timing = {"scan_p50_ms": 1.0, "scan_p99_ms": 2.0}

@@ -47,7 +47,8 @@ def test_killed_back_end_ends_with_the_same_graph(
     assert outcome.distance(undisturbed) < SAME_TRAJECTORY
     assert outcome.revision == undisturbed.revision
     print("kills at", kills, "keyframes sent again", outcome.asked_again)
-    assert max(map(len, outcome.asked_again)) == 1, "whatever was in the graph is in the journal"
+    assert max(map(len, outcome.asked_again)) <= 1, "whatever was in the graph is in the journal"
+    assert any(outcome.asked_again), "no kill cost a keyframe, so nothing was seen of how one comes again"
 
 
 @pytest.fixture

@@ -16,8 +16,10 @@ from ignis_lcm.ignis import imu_t
 from live_agreement import require_equal_up_to_the_first_drop
 
 from ignis import read_log
+from ignis.errors import EXIT_DAMAGED
 from ignis.log_config import recorded_config
 from ignis.pipeline import Pipeline, effective_config
+from ignis.run_folder import losses_in
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
 CONFIG = CHECKOUT / "config" / "ignis8_tuned.json"
@@ -74,8 +76,9 @@ def live(private_network: None, tmp_path_factory: pytest.TempPathFactory) -> Liv
 def replayed(live: Live, folder: Path) -> dict[str, Any]:
     command = [sys.executable, "-m", "ignis.replay", live.log, "--out", folder, "--no-page"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr
     report: dict[str, Any] = json.loads((folder / "report.json").read_text())
+    # A busy machine loses datagrams, in the recorder as well.
+    assert done.returncode == (EXIT_DAMAGED if losses_in(report) else 0), done.stderr
     return report
 
 
