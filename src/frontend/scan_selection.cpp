@@ -50,9 +50,9 @@ std::span<const ScanPoint> ScanSelector::bounded(std::span<const ScanPoint> poin
   const std::size_t most = voxel_ > 0.0 ? kMostToThin : kMostToKeep;
   if (points.size() <= most) return points;
   // By a fraction: where points come column by column, a whole step would leave out the same beams again and again.
-  some_.clear();
-  for (std::size_t i = 0; i < most; ++i) some_.push_back(points[i * points.size() / most]);
-  return some_;
+  sampled_.clear();
+  for (std::size_t i = 0; i < most; ++i) sampled_.push_back(points[i * points.size() / most]);
+  return sampled_;
 }
 
 }  // namespace ignis

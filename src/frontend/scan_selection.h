@@ -39,7 +39,7 @@ class ScanSelector {
   double voxel_;      ///< [m]
   int max_points_;
   VoxelThinner thinner_;
-  std::vector<ScanPoint> some_;
+  std::vector<ScanPoint> sampled_;
   ScanSelection selection_;
 };
 

@@ -18,6 +18,21 @@ using test::sample_at;
 using test::Sensors;
 using test::Watched;
 
+/// The scan that ends so long after the beginning, or the next one. All drives begin at the same instant.
+const ScanResult& scan_at(const Watched& run, double seconds) {
+  const Utime utime = drive().imu.front().utime + to_micros(seconds);
+  return *std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; });
+}
+
+/// The same drive with one axis of the accelerometer at its limit for so long, 8 s after the beginning.
+Drive with_clipped_axis(Drive input, double seconds) {
+  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.0 + seconds); ++sample) {
+    sample->accel.x() = 25.0;
+    sample->saturated = true;
+  }
+  return input;
+}
+
 /// Position error over its predicted sigma, per degree of freedom, mean over the scans after `seconds`.
 double position_nees(const Watched& run, double seconds) {
   double sum = 0.0;
@@ -65,9 +80,7 @@ TEST(Fault_F2, ImuGoneForThreeSecondsIsBridgedByScansAndAnnounced) {
 
 /// [m] What the position at `seconds` is off by, in the frame of the start.
 Eigen::Vector3d position_error(const Watched& run, double seconds) {
-  const Utime utime = drive().imu.front().utime + to_micros(seconds);
-  const NavState& state =
-      std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
+  const NavState& state = scan_at(run, seconds).state;
   return state.T_odom_body.translation - drive().truth(test::drive_seconds(drive(), state.utime)).translation;
 }
 
@@ -91,16 +104,9 @@ TEST(Fault_F2, AnImuGapOfAnyLengthIsToldWithin100MsAndCostsAFiftiethOfTheWay) {
 }
 
 TEST(Fault_F3, AClippedAxisTeachesTheBiasesNothing) {
-  Drive input = drive();
-  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
-    sample->accel.x() = 25.0;
-    sample->saturated = true;
-  }
+  const Drive input = with_clipped_axis(drive(), 0.1);
   const Watched run(input);
-  const auto state_at = [&](double seconds) {
-    const Utime utime = input.imu.front().utime + to_micros(seconds);
-    return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
-  };
+  const auto state_at = [&](double seconds) { return scan_at(run, seconds).state; };
   EXPECT_EQ((state_at(9.0).accel_bias - state_at(7.95).accel_bias).norm(), 0.0);
   EXPECT_EQ((state_at(9.0).gravity_tilt - state_at(7.95).gravity_tilt).norm(), 0.0);
   EXPECT_GT((state_at(9.5).accel_bias - state_at(7.95).accel_bias).norm(), 0.0) << "one second later it learns again";
@@ -111,32 +117,22 @@ TEST(Fault_F3, AClippedAxisTeachesTheBiasesNothing) {
 TEST(Fault_F3, TheBiasesAreWithinThreeSigmaTenSecondsAfterAClippedAxis) {
   const Sensors sensors;
   const Drive whole = test::simulate(test::furnished_hall(), test::ellipse_drive(2.0, 6.0, 4.0, 1.0), 19.0, sensors, 7);
-  for (const double clipped : {0.005, 0.05, 0.2}) {
-    Drive input = whole;
-    for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.0 + clipped); ++sample) {
-      sample->accel.x() = 25.0;
-      sample->saturated = true;
-    }
+  for (const double seconds : {0.005, 0.05, 0.2}) {
+    const Drive input = with_clipped_axis(whole, seconds);
     const Watched run(input);
     for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
-    const Utime ten_seconds_later = input.imu.front().utime + to_micros(18.0 + clipped);
-    const ScanResult& scan = *std::ranges::lower_bound(run.scans, ten_seconds_later, {},
-                                                       [](const ScanResult& result) { return result.stats.utime; });
+    const ScanResult& scan = scan_at(run, 18.0 + seconds);
     const auto in_sigmas = [&scan](const Eigen::Vector3d& error, int at) {
       return error.cwiseQuotient(scan.covariance.diagonal().segment<3>(at).cwiseSqrt()).cwiseAbs().maxCoeff();
     };
-    EXPECT_LT(in_sigmas(scan.state.gyro_bias - sensors.gyro_bias, kGyroBias), 3.0) << clipped << " s";
-    EXPECT_LT(in_sigmas(scan.state.accel_bias - sensors.accel_bias, kAccelBias), 3.0) << clipped << " s";
+    EXPECT_LT(in_sigmas(scan.state.gyro_bias - sensors.gyro_bias, kGyroBias), 3.0) << seconds << " s";
+    EXPECT_LT(in_sigmas(scan.state.accel_bias - sensors.accel_bias, kAccelBias), 3.0) << seconds << " s";
     EXPECT_LT(scan.covariance(kAccelBias, kAccelBias), 0.03 * 0.03) << "and that says something";
   }
 }
 
 TEST(Fault_F3, TheScanThatCorrectsAWrongVelocityIsDeskewedWithTheRightOne) {
-  Drive input = drive();
-  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
-    sample->accel.x() = 25.0;
-    sample->saturated = true;
-  }
+  const Drive input = with_clipped_axis(drive(), 0.1);
   const Watched clean(drive());
   const Watched clipped(input);
   ASSERT_EQ(clean.scans.size(), clipped.scans.size());
@@ -152,11 +148,7 @@ TEST(Fault_F3, TheScanThatCorrectsAWrongVelocityIsDeskewedWithTheRightOne) {
 }
 
 TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
-  Drive input = drive();
-  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
-    sample->accel.x() = 25.0;
-    sample->saturated = true;
-  }
+  const Drive input = with_clipped_axis(drive(), 0.1);
   const Watched run(input);
   // A scan tells the position at the mean instant of its points, so what is not known of the velocity adds to that of
   // its end: their covariance is the mean age of the points times the velocity's variance.
@@ -168,17 +160,8 @@ TEST(Fault_F3, AVelocityThatIsNotKnownMovesThePositionAtTheScansEnd) {
 
 constexpr std::size_t kWhileClipped = 160;  // scan
 
-Drive clipped_drive() {
-  Drive input = drive();
-  for (auto sample = sample_at(input, 8.0); sample != sample_at(input, 8.1); ++sample) {
-    sample->accel.x() = 25.0;
-    sample->saturated = true;
-  }
-  return input;
-}
-
 TEST(Fault_F3, AScanThatIsRefusedLeavesNoDriftInTheMap) {
-  Drive input = clipped_drive();
+  Drive input = with_clipped_axis(drive(), 0.1);
   for (ScanPoint& point : input.scans[kWhileClipped].points) point.position *= 0.3F;
   const Watched refused(input);
   ASSERT_FALSE(refused.scans[kWhileClipped].stats.applied());
@@ -191,7 +174,7 @@ TEST(Fault_F3, AScanThatIsRefusedLeavesNoDriftInTheMap) {
 }
 
 TEST(Fault_F3, AScanThatIsRefusedSaysNothingOfTheVelocityThatTheMapWasMadeWith) {
-  Drive input = clipped_drive();
+  Drive input = with_clipped_axis(drive(), 0.1);
   for (ScanPoint& point : input.scans[kWhileClipped].points) point.position *= 0.3F;
   const Watched run(input);
   ASSERT_EQ(run.scans[kWhileClipped].stats.reason, ScanReason::kTooFewMatches)
@@ -225,10 +208,7 @@ void expect_harmless(const Watched& run) {
   EXPECT_LE(refused, 2);
   for (const auto& [utime, trust] : run.trust) EXPECT_NE(trust, Trust::kLost);
   EXPECT_LT(run.error_at_end(), 0.3);
-  const auto after = [&](double seconds) {
-    const Utime utime = drive().imu.front().utime + to_micros(seconds);
-    return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
-  };
+  const auto after = [&](double seconds) { return scan_at(run, seconds).state; };
   EXPECT_EQ((after(8.95).accel_bias - after(8.05).accel_bias).norm(), 0.0);
   EXPECT_EQ((after(8.95).gyro_bias - after(8.05).gyro_bias).norm(), 0.0);
 }
@@ -245,10 +225,7 @@ TEST(Fault_F3, StandingAfterAClippedSampleTeachesTheBiasesNothingEither) {
   clipped->accel.x() = 25.0;
   clipped->saturated = true;
   const Watched run(input);
-  const auto state_at = [&](double seconds) {
-    const Utime utime = input.imu.front().utime + to_micros(seconds);
-    return std::ranges::lower_bound(run.scans, utime, {}, [](const ScanResult& r) { return r.stats.utime; })->state;
-  };
+  const auto state_at = [&](double seconds) { return scan_at(run, seconds).state; };
   EXPECT_EQ((state_at(8.95).gyro_bias - state_at(8.05).gyro_bias).norm(), 0.0);
   EXPECT_GT((state_at(9.6).gyro_bias - state_at(8.05).gyro_bias).norm(), 0.0) << "one second later it learns again";
 }

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <random>
 
-#include "common/byte_codec.h"
 #include "common/so3.h"
 #include "frontend/neighbour_search.h"
 
@@ -381,21 +380,6 @@ TEST(LocalMap, StaysBoundedOnALongDrive) {
     largest = std::max(largest, map.size());
   }
   EXPECT_LT(largest, 500 * 20);
-}
-
-/// The checksum of a checkpoint tells damage, not who wrote it. Found by fuzz_checkpoint.
-TEST(LocalMap, BytesOfABlockThatNoVoxelHasARoomForAreImpossible) {
-  LocalMap map(FrontendConfig{});
-  map.insert(random_points(1, 1, 4.0F), Pose{}, true);
-  std::vector<std::byte> bytes = to_bytes(map);
-  constexpr std::size_t kFace = sizeof(std::uint32_t) + 3 * sizeof(std::int32_t);  // behind the count and the place
-  for (const int face : {0, 1, 2, 255}) {
-    bytes[kFace] = static_cast<std::byte>(face);
-    LocalMap read(FrontendConfig{});
-    ByteReader reader(bytes);
-    transfer(reader, read);
-    EXPECT_EQ(reader.failed(), face > 1) << face;
-  }
 }
 
 TEST(LocalMap, RefusesAnImpossibleConfiguration) {
