@@ -2,6 +2,7 @@
 //
 // How a scan corrects the filter: where matching begins, and what the covariances that are published take from it.
 #include <algorithm>
+#include <cmath>
 
 #include "frontend/lio.h"
 #include "frontend/scan_instant.h"
@@ -9,6 +10,23 @@
 
 namespace ignis {
 namespace {
+
+constexpr double kVagueSpeed = 0.1;    // m/s: known better, a wall ahead enters the map by itself
+constexpr double kUnevenStep = 0.03;   // m: of the position, beyond what the velocity explains
+constexpr double kUnevenSpeed = 0.03;  // m/s
+
+/// Kalman update with a measured error of the velocity.
+void take_from_velocity(FilterState& filter, const VelocityError& error) {
+  using Row = Eigen::Matrix<double, 1, kErrorSize>;
+  Row H = Row::Zero();
+  H.segment<3>(kVelocity) = error.direction.transpose();
+  const ErrorCovariance& P = filter.covariance;
+  const ErrorVector K = P * H.transpose() / ((H * P * H.transpose())(0) + error.variance);
+  const ErrorCovariance kept = ErrorCovariance::Identity() - K * H;
+  filter.covariance = kept * P * kept.transpose() + error.variance * K * K.transpose();
+  filter.covariance = (0.5 * (filter.covariance + filter.covariance.transpose())).eval();
+  filter.nominal = perturbed(filter.nominal, (-error.along * K).eval());
+}
 
 /// Beside what the scan does not observe.
 void name_doubt(ScanStats& stats, const std::string& doubt) {
@@ -95,6 +113,41 @@ void Lio::count_correction(const FilterState& predicted, const MatchResult& matc
   const Eigen::Vector3d shift = T_odom_body.translation - predicted.nominal.T_odom_body.translation;
   const Eigen::Matrix3d about_here = before + shift * shift.transpose();
   drift_.doubt(about_here, match.doubtful, T_odom_body, cautious_.block<3, 3>(kPosition, kPosition));
+}
+
+/// Where scans do not observe a direction, walls that are in no map yet tell how fast it goes.
+void Lio::heed_sighted_walls(const FilterState& predicted, const MatchResult& match) {
+  const std::vector<Eigen::Vector3d> blind = blind_shifts(match.degeneracy);
+  const bool believed = config_.salient_sigma > 0.0 && velocity_known_ && match.stats.applied();
+  if (!believed || blind.empty() || match.stats.standing || matcher_.is_restless()) {
+    sighted_walls_.clear();
+    return;
+  }
+  const Eigen::Vector3d step = filter_.nominal.T_odom_body.translation - predicted.nominal.T_odom_body.translation;
+  const Eigen::Vector3d gain = filter_.nominal.v_odom - predicted.nominal.v_odom;
+  if (std::ranges::any_of(blind, [&](const Eigen::Vector3d& axis) {
+        return std::abs(axis.dot(step)) > kUnevenStep || std::abs(axis.dot(gain)) > kUnevenSpeed;
+      })) {
+    sighted_walls_.clear();
+  }
+  std::vector<Eigen::Vector3d> points;
+  for (const Eigen::Vector3f& point : matcher_.unmatched()) {
+    points.push_back(filter_.nominal.T_odom_body * point.cast<double>());
+  }
+  sighted_walls_.add_scan(filter_.nominal.utime, points);
+  if (!sighted_walls_.is_due()) return;
+  for (const Eigen::Vector3d& axis : blind) {
+    const double sigma = std::sqrt(axis.dot(cautious_.block<3, 3>(kVelocity, kVelocity) * axis));
+    if (sigma < kVagueSpeed) continue;
+    const std::optional<VelocityError> error = sighted_walls_.judge(axis, sigma, config_.imu_noise_accel);
+    if (!error) continue;
+    FilterState cautious{filter_.nominal, cautious_};
+    take_from_velocity(cautious, *error);
+    cautious_ = cautious.covariance;
+    take_from_velocity(filter_, *error);
+    sighted_walls_.clear();
+    return;
+  }
 }
 
 }  // namespace ignis

@@ -235,6 +235,7 @@ ScanResult Lio::process(const Scan& scan) {
     sparse = voxel_downsample(cloud, config_.voxel_size_m, thinner_);
   }
   match.stats.standing = use_standstill();
+  heed_sighted_walls(predicted, match);
   note_evidence(predicted, match.stats, scan);
   heed_second_opinion(predicted, match);
   seek_confirmation(match.stats.reason);

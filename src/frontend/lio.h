@@ -20,6 +20,7 @@
 #include "frontend/scan_selection.h"
 #include "frontend/scan_stats.h"
 #include "frontend/second_opinion.h"
+#include "frontend/sighted_walls.h"
 #include "frontend/start_motion.h"
 #include "frontend/trust_monitor.h"
 #include "frontend/voxel_thinner.h"
@@ -109,6 +110,7 @@ class Lio {
   /// [m^2] odom axes.
   [[nodiscard]] Eigen::Matrix3d published_position_covariance() const;
   void count_correction(const FilterState& predicted, const MatchResult& match, double age);
+  void heed_sighted_walls(const FilterState& predicted, const MatchResult& match);
   void enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void grow_map(const std::vector<CloudPoint>& cloud, const MatchResult& match);
   void follow_moving_start(ScanReason reason);
@@ -172,6 +174,7 @@ class Lio {
   Keyframer keyframer_;
   TrustMonitor trust_;
   SecondOpinion opinion_;
+  SightedWalls sighted_walls_;
   std::deque<Scan> pending_;
   std::optional<Utime> last_scan_end_;  ///< of the newest scan that was taken into the queue
   bool running_ = false;
@@ -206,6 +209,7 @@ class Lio {
     transfer(io, lio.keyframer_);
     transfer(io, lio.trust_);
     transfer(io, lio.opinion_);
+    transfer(io, lio.sighted_walls_);
     io.maybe(lio.last_scan_end_);
     io.number(lio.running_);
     transfer(io, lio.filter_);

@@ -104,6 +104,7 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
 
 void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
   constraints_.clear();
+  unmatched_.clear();
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   for (std::size_t begin = 0; begin < points_body.size(); begin += kPointsTogether) {
     const auto points = points_body.subspan(begin, std::min(kPointsTogether, points_body.size() - begin));
@@ -112,7 +113,10 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
     const std::span<const PlaneFit> planes = plane_finder_.find(map, queries_, pose.translation);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const PlaneFit& plane = planes[i];
-      if (plane.verdict != PlaneVerdict::kPlane) continue;
+      if (plane.verdict != PlaneVerdict::kPlane) {
+        unmatched_.push_back(points[i]);
+        continue;
+      }
       const Eigen::Vector3d point_body = points[i].cast<double>();
       const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
       const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);

@@ -67,6 +67,9 @@ class ScanMatcher {
   /// True while surfaces are found to move along a direction that few others face, see MovingSurfaces.
   [[nodiscard]] bool is_restless() const { return moving_surfaces_.is_restless(); }
 
+  /// Points [m, body frame] of the newest scan that met no plane, where its pose was looked for last.
+  [[nodiscard]] std::span<const Eigen::Vector3f> unmatched() const { return unmatched_; }
+
   /// What a few planes said of a shift has been shown to be wrong. From here on shifts that so few observe count as not
   /// observed, and salient points, which may be the same, say nothing.
   void distrust_weak_shifts() { distrusts_weak_shifts_ = true; }
@@ -134,6 +137,7 @@ class ScanMatcher {
   PlaneFinder plane_finder_;
   std::vector<Eigen::Vector3d> queries_;  ///< [m] odom frame; of some points
   std::vector<Constraint> constraints_;
+  std::vector<Eigen::Vector3f> unmatched_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;
   double map_noise_ = 1.0;  ///< factor on the variance of a point for the map's own errors
