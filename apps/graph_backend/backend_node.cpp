@@ -120,6 +120,7 @@ void BackendNode::add_waiting_keyframes() {
     newest_utime_ = std::max(newest_utime_, keyframe->state.utime);
     refusal_ = update.accepted() ? "" : std::format("keyframe {} refused: {}", keyframe->id, update.reason);
     if (update.accepted()) publish_update(update);
+    link_.got_on();
   }
 }
 
@@ -148,7 +149,7 @@ const char* BackendNode::on_command(const graph_command_t& command) {
 void BackendNode::adopt_due_optimum() {
   if (!schedule_.adoption_due(graph_.smoother().stats().keyframes)) return;
   schedule_.end();
-  const ShadowOptimum optimum = optimum_.take();
+  const ShadowOptimum optimum = optimum_.take([this] { link_.got_on(); });
   const int swaps = graph_.smoother().stats().shadow_swaps;
   const SmootherUpdate update = graph_.change([&](Smoother& smoother) { return smoother.adopt(optimum); });
   if (graph_.smoother().stats().shadow_swaps != swaps) publish_update(update);

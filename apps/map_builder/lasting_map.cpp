@@ -38,7 +38,7 @@ void LastingMap::begin_journal(std::int32_t session) {
   journal_->begin({.config_fingerprint = fingerprint_, .session = session});
 }
 
-LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud) {
+LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud, const std::function<void()>& got_on) {
   if (!loaded_) {
     if (damage_.empty()) return {};
     std::string damage = std::exchange(damage_, {});
@@ -56,7 +56,7 @@ LastingMap::Beginning LastingMap::begin_with(const messages::PosedCloud& cloud) 
   number_ = written_ = newest.number;
   journal_->resume(loaded.head);
   session_ = loaded.head.session;
-  restore(map_, std::move(loaded.records));
+  restore(map_, std::move(loaded.records), got_on);
   note_drops();
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - began;
   return {.note = std::format("goes on with {} keyframes, {} voxels after {:.1f} s, built in {:.2f} s{}{}",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,8 +34,8 @@ class LastingMap {
     std::string damage{};                  ///< what of the journal is lost
   };
 
-  /// Goes on with the journal that waits, or begins a new one.
-  Beginning begin_with(const messages::PosedCloud& cloud);
+  /// Goes on with the journal that waits, or begins a new one. `got_on` is called again and again meanwhile.
+  Beginning begin_with(const messages::PosedCloud& cloud, const std::function<void()>& got_on);
 
   /// Forgets everything: the keyframes and scans of another session or drive follow.
   void begin_session(std::int32_t session);

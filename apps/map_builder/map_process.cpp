@@ -136,7 +136,8 @@ void MapProcess::on_cloud(const messages::PosedCloud& cloud) {
   // The front end's next session begins with a scan. Any other one takes a keyframe: it says more of where it belongs.
   if (session_ && std::int64_t{cloud.session} == std::int64_t{*session_} + 1) begin_session(cloud.session);
   if (!accept_session(cloud.session)) return;
-  if (const LastingMap::Beginning beginning = lasting_.begin_with(cloud); !beginning.note.empty()) {
+  const auto got_on = [this] { link_.got_on(); };
+  if (const LastingMap::Beginning beginning = lasting_.begin_with(cloud, got_on); !beginning.note.empty()) {
     std::cerr << "map_builder: " << beginning.note << std::endl;
     keyframes_changed_ = true;
     journal_damage_ = beginning.damage;
@@ -165,6 +166,7 @@ void MapProcess::catch_up() {
   }
   for (const MapInput& input : missed_.take(now_s())) {
     std::visit([this](const auto& each) { insert(each); }, input);
+    link_.got_on();
   }
 }
 
@@ -354,8 +356,10 @@ std::string MapProcess::trouble() {
 void MapProcess::report() {
   update_status();
   const std::string why = trouble();
-  const std::int8_t state = why.empty() ? health_t::OK : health_t::DEGRADED;
-  hud_.health = (why.empty() ? "OK" : "DEGRADED: " + why) + drops_text(map_.clouds().dropped());
+  // A disk that takes nothing needs a person.
+  const bool fault = !why.empty() && why == lasting_.failure();
+  const std::int8_t state = why.empty() ? health_t::OK : (fault ? health_t::FAULT : health_t::DEGRADED);
+  hud_.health = (why.empty() ? "OK" : (fault ? "FAULT: " : "DEGRADED: ") + why) + drops_text(map_.clouds().dropped());
   ViewUpdate update;
   update.api_status = shared(status_json(hud_, budget_, server_.counters(), pictures_, loops_.text()));
   server_.publish(std::move(update));

@@ -108,9 +108,11 @@ void LcmLink::refuse(Receiver& receiver, const std::string& reason, bool is_fore
 bool LcmLink::handle(int timeout_ms) {
   const int handled = lcm_.handleTimeout(timeout_ms);
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
-  if (handled >= 0) ++progress_;
+  if (handled >= 0) got_on();
   return handled > 0;
 }
+
+void LcmLink::got_on() { supervisor_.feed(++progress_, uptime_s()); }
 
 double LcmLink::uptime_s() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();

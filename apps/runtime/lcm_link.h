@@ -90,6 +90,10 @@ class LcmLink {
   /// error is progress: everything that had arrived so far has been handled.
   bool handle(int timeout_ms);
 
+  /// For a handler that may work longer than the watchdog waits: call it on the same thread whenever a part of its work
+  /// is done, and never where none is.
+  void got_on();
+
   /// For work that does not come over the bus, such as bytes of a serial line: it was done `latency_ms` after its input
   /// had arrived.
   void add_latency(double latency_ms) { budget_.add_latency(latency_ms); }
@@ -98,7 +102,7 @@ class LcmLink {
   /// be sent, every 200 ms. `utime`: newest measurement seen [us]. `state`: one of health_t's constants; OK becomes
   /// DEGRADED, with the reason, when this process exceeds its limits, and FAULT when the processes on the bus do not
   /// belong together (PeerWatch) or nothing can be sent to it (SendWatch).
-  /// Call it at every turn of the main loop: the supervisor hears of readiness and progress here.
+  /// Call it again and again: at the first time the supervisor hears that the process is ready.
   void report_health(Utime utime, std::int8_t state, const std::string& state_text, std::int32_t resets = 0);
 
   [[nodiscard]] std::int64_t failed_sends() const { return failed_sends_; }

@@ -36,7 +36,11 @@ bool ServiceNotifier::is_supervised() { return std::getenv("NOTIFY_SOCKET") != n
 
 void ServiceNotifier::turn(std::int64_t progress, double now_s) {
   if (!ready_) say_ready();
-  if (watchdog_period_s_ <= 0.0 || progress == fed_with_ || now_s - last_fed_s_ < watchdog_period_s_) return;
+  feed(progress, now_s);
+}
+
+void ServiceNotifier::feed(std::int64_t progress, double now_s) {
+  if (!ready_ || watchdog_period_s_ <= 0.0 || progress == fed_with_ || now_s - last_fed_s_ < watchdog_period_s_) return;
   fed_with_ = progress;
   last_fed_s_ = now_s;
   sd_notify(0, "WATCHDOG=1");

@@ -18,10 +18,12 @@ class ServiceNotifier {
   /// message that nobody reads and being started again.
   [[nodiscard]] static bool is_supervised();
 
-  /// Call at every turn of the main loop. `progress`: what has been handled since start; `now_s` [s of any steady
-  /// clock]. The first call says READY. The watchdog is fed only when `progress` has grown since it was fed last: a
-  /// loop that hangs in a handler starves it, and so does one that turns without handling anything.
+  /// The main loop turns: the first call says READY. `now_s` [s of any steady clock].
   void turn(std::int64_t progress, double now_s);
+
+  /// Feeds the watchdog when `progress`, what has been done since start, has grown since it was fed last: a loop that
+  /// hangs in a handler starves it, and so does one that turns without handling anything. Nothing before READY.
+  void feed(std::int64_t progress, double now_s);
 
   /// One line for `systemctl status`.
   void status(const std::string& text) const;

@@ -37,10 +37,11 @@ namespace {
 
 struct Stopped : std::exception {};
 
-gtsam::LevenbergMarquardtParams parameters(const std::stop_token& stop) {
+gtsam::LevenbergMarquardtParams parameters(const std::stop_token& stop, const std::function<void()>& got_on) {
   gtsam::LevenbergMarquardtParams params;
-  params.iterationHook = [stop](std::size_t, double, double) {
+  params.iterationHook = [stop, got_on](std::size_t, double, double) {
     if (stop.stop_requested()) throw Stopped();
+    if (got_on) got_on();
   };
   params.setRelativeErrorTol(1e-10);
   params.setAbsoluteErrorTol(1e-8);
@@ -94,14 +95,14 @@ std::optional<gtsam::Values> carried_to_now(const ShadowOptimum::Solution& optim
 
 }  // namespace
 
-ShadowOptimum solve(const ShadowProblem& problem, const std::stop_token& stop) {
+ShadowOptimum solve(const ShadowProblem& problem, const std::stop_token& stop, const std::function<void()>& got_on) {
   ShadowOptimum result;
   if (!problem.graph || problem.graph->ids.empty()) return result;
   const ShadowProblem::Graph& graph = *problem.graph;
   result.revision = graph.revision;
   result.keyframes = static_cast<int>(graph.ids.size());
   try {
-    gtsam::LevenbergMarquardtOptimizer optimizer(graph.factors, graph.estimate, parameters(stop));
+    gtsam::LevenbergMarquardtOptimizer optimizer(graph.factors, graph.estimate, parameters(stop, got_on));
     result.half_chi_square_before = optimizer.error();
     auto solution = std::make_shared<ShadowOptimum::Solution>();
     solution->values = optimizer.optimize();

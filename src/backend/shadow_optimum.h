@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <stop_token>
 
@@ -28,7 +29,8 @@ struct ShadowOptimum {
 };
 
 /// Pure: no state is shared with the smoother. Seconds for thousands of keyframes; asked to stop it ends with the
-/// iteration under way.
-[[nodiscard]] ShadowOptimum solve(const ShadowProblem& problem, const std::stop_token& stop = {});
+/// iteration under way. `got_on` is called after each one, on the thread that solves.
+[[nodiscard]] ShadowOptimum solve(const ShadowProblem& problem, const std::stop_token& stop = {},
+                                  const std::function<void()>& got_on = {});
 
 }  // namespace ignis

@@ -5,7 +5,7 @@
 
 namespace ignis {
 
-ThreeLevelMap rebuild(const RebuildJob& job) {
+ThreeLevelMap rebuild(const RebuildJob& job, const std::function<void()>& got_on) {
   ThreeLevelMap map(job.config);
   std::map<std::int32_t, SharedCloud> store;
   const ThreeLevelMap::CloudLookup lookup = [&](std::int32_t id) { return view_of(*store.at(id)); };
@@ -16,10 +16,12 @@ ThreeLevelMap rebuild(const RebuildJob& job) {
     store[cloud.id] = cloud.cloud;
     map.add_cloud(cloud.id, cloud.T_map_keyframe);
     if (cloud.id != job.open_cloud) map.cast_votes(cloud.id, lookup);
+    if (got_on) got_on();
   }
   for (const PlacedCloud& cloud : job.clouds) {
     map.insert(cloud.id, cloud.cloud->points);
     map.stay_within_bound(lookup);
+    if (got_on) got_on();
   }
   map.set_open_cloud(job.open_cloud);
   return map;

@@ -39,8 +39,8 @@ struct RebuildJob {
   std::optional<std::int32_t> open_cloud;
 };
 
-/// Builds the map of a job: the same voxels on any thread and after any history.
-[[nodiscard]] ThreeLevelMap rebuild(const RebuildJob& job);
+/// Builds the map of a job: the same voxels on any thread and after any history. `got_on` is called after each cloud.
+[[nodiscard]] ThreeLevelMap rebuild(const RebuildJob& job, const std::function<void()>& got_on = {});
 
 /// The voxel map of a drive. Frames: `odom` of the front end, `map` of the back end.
 ///

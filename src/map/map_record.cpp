@@ -73,7 +73,7 @@ MapRecord record_of_keyframe(const LiveMap& map, const Keyframe& keyframe) {
           .points = kept_points(map, keyframe.cloud)};
 }
 
-void restore(LiveMap& map, std::vector<MapRecord> records) {
+void restore(LiveMap& map, std::vector<MapRecord> records, const std::function<void()>& got_on) {
   // Each keyframe with its scans behind it, and those that came late at the end, where they are late again.
   std::ranges::stable_sort(records, {},
                            [](const MapRecord& each) { return std::tuple(each.is_late, each.id, !each.is_keyframe); });
@@ -90,8 +90,9 @@ void restore(LiveMap& map, std::vector<MapRecord> records) {
     } else if (placed.contains(record.id)) {
       map.insert_scan(record.points, record.T_odom_body);
     }
+    if (got_on) got_on();
   }
-  map.finish_rebuild(rebuild(map.begin_rebuild()));
+  map.finish_rebuild(rebuild(map.begin_rebuild(), got_on));
 }
 
 }  // namespace ignis

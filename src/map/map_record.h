@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -53,6 +54,7 @@ struct MapRecord {
 
 /// Carries the calls out again in a map without clouds, whatever order they come in, and draws once at the end. Poses
 /// of the back end that the map knows already are used. What the keyframe of its file is missing for is left out.
-void restore(LiveMap& map, std::vector<MapRecord> records);
+/// `got_on` is called after each record and each cloud that is drawn.
+void restore(LiveMap& map, std::vector<MapRecord> records, const std::function<void()>& got_on = {});
 
 }  // namespace ignis

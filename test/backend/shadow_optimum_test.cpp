@@ -121,7 +121,9 @@ TEST(ShadowOptimum, IsNoneWhenItIsNoLongerWanted) {
   extend(smoother, drive, 0, 10);
   const ShadowProblem problem = smoother.shadow_problem();
   std::stop_source source;
-  EXPECT_TRUE(solve(problem, source.get_token()).solved);
+  int iterations = 0;
+  EXPECT_TRUE(solve(problem, source.get_token(), [&] { ++iterations; }).solved);
+  EXPECT_GT(iterations, 0) << "whoever waits cannot tell it from one that hangs";
   source.request_stop();
   EXPECT_FALSE(solve(problem, source.get_token()).solved);
 }

@@ -82,6 +82,22 @@ TEST_F(ServiceNotifierTest, FeedsTheWatchdogFromProgressAndNotFromTime) {
   EXPECT_TRUE(heard().empty()) << "fed although nothing was handled since";
 }
 
+TEST_F(ServiceNotifierTest, FeedsTheWatchdogInTheMidstOfATurnToo) {
+  listen_as_systemd();
+  setenv("WATCHDOG_USEC", "2000000", 1);
+  ServiceNotifier notifier;
+  notifier.feed(1, 1.0);
+  EXPECT_TRUE(heard().empty()) << "the supervisor waits for READY first";
+  notifier.turn(1, 1.0);
+  (void)heard();
+  for (int part = 2; part <= 41; ++part) notifier.feed(part, 1.0 + 0.1 * part);
+  EXPECT_GE(heard().size(), 7U) << "each half second of four";
+  notifier.feed(42, 60.0);
+  (void)heard();
+  notifier.feed(42, 120.0);
+  EXPECT_TRUE(heard().empty()) << "fed although nothing was done since";
+}
+
 TEST_F(ServiceNotifierTest, FeedsNoWatchdogOfAnotherProcess) {
   listen_as_systemd();
   setenv("WATCHDOG_USEC", "4000000", 1);
