@@ -33,7 +33,7 @@ BackendHealth health_of(const BackendSituation& situation) {
                         graph.solver_failure)};
   }
   if (!situation.refusal.empty()) return {health_t::DEGRADED, situation.refusal};
-  if (!situation.journal_failure.empty()) return {health_t::DEGRADED, situation.journal_failure};
+  if (!situation.journal_failure.empty()) return {health_t::FAULT, situation.journal_failure};
   if (situation.waiting_for) {
     return {health_t::DEGRADED, std::format("waiting for keyframe {}", *situation.waiting_for)};
   }

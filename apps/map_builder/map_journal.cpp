@@ -5,10 +5,12 @@
 #include <cerrno>
 #include <cstring>
 #include <format>
+#include <ios>
 #include <iterator>
 #include <utility>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/byte_record.h"
@@ -20,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPrefix = "map_keyframe_";
+constexpr std::size_t kMostWaiting = 64U << 20U;  // [bytes] for a disk that takes none: half an hour of driving
 
 std::vector<fs::path> files_of(const fs::path& folder) {
   std::vector<fs::path> paths;
@@ -42,8 +45,14 @@ MapJournal::MapJournal(fs::path folder) : folder_(std::move(folder), "map_builde
 MapJournal::~MapJournal() { close_file(); }
 
 MapJournal::File MapJournal::read(const fs::path& path) {
-  const std::vector<std::byte> bytes = read_bytes(path);
   File file;
+  std::vector<std::byte> bytes;
+  try {
+    bytes = read_bytes(path);
+  } catch (const std::ios_base::failure& error) {
+    file.damage = std::format("{}: the disk does not give it back: {}", path.filename().string(), error.what());
+    return file;
+  }
   while (file.whole_bytes < bytes.size() && file.damage.empty()) {
     const RecordAt at = record_at(bytes, file.whole_bytes);
     if (!at.damage.empty()) {
@@ -100,6 +109,8 @@ void MapJournal::resume(const MapRecordHead& head) {
   head_ = head;
   failure_.clear();
   lost_ = 0;
+  waiting_.clear();
+  waiting_bytes_ = 0;
   for (const fs::path& path : files_of(folder_.path())) {
     const auto known = std::ranges::find_if(sizes_, [&](const auto& each) { return path_of(each.first) == path; });
     if (known == sizes_.end()) {
@@ -118,6 +129,13 @@ void MapJournal::close_file() {
 }
 
 void MapJournal::open_for(std::int32_t id) {
+  struct stat ours{};
+  if (file_ >= 0 && fstat(file_, &ours) == 0 && ours.st_nlink == 0) {
+    fail("was removed", ENOENT);
+    ++lost_;
+    sizes_.erase(file_id_);
+    close_file();
+  }
   if (file_ >= 0 && file_id_ == id) return;
   close_file();
   file_id_ = id;
@@ -126,19 +144,32 @@ void MapJournal::open_for(std::int32_t id) {
 }
 
 void MapJournal::append(const MapRecord& record) {
-  open_for(record.id);
-  if (file_ < 0) {
+  Waiting waiting{.id = record.id, .bytes = encode_record(encode(record))};
+  if (waiting_bytes_ + waiting.bytes.size() > kMostWaiting) {
     ++lost_;
-    return;
+  } else {
+    waiting_bytes_ += waiting.bytes.size();
+    waiting_.push_back(std::move(waiting));
   }
-  std::vector<std::byte> bytes;
-  if (sizes_[record.id] == 0) bytes = encode_record(encode(head_));
-  std::ranges::copy(encode_record(encode(record)), std::back_inserter(bytes));
-  write(bytes);
+  write_waiting();
+}
+
+void MapJournal::write_waiting() {
+  while (!waiting_.empty()) {
+    if (!write(waiting_.front())) return;
+    waiting_bytes_ -= waiting_.front().bytes.size();
+    waiting_.pop_front();
+  }
+  if (lost_ == 0) failure_.clear();
 }
 
 /// All of it or nothing.
-void MapJournal::write(const std::vector<std::byte>& bytes) {
+bool MapJournal::write(const Waiting& record) {
+  open_for(record.id);
+  if (file_ < 0) return false;
+  std::vector<std::byte> bytes;
+  if (sizes_[record.id] == 0) bytes = encode_record(encode(head_));
+  std::ranges::copy(record.bytes, std::back_inserter(bytes));
   std::size_t written = 0;
   while (written < bytes.size()) {
     const ssize_t count = ::write(file_, bytes.data() + written, bytes.size() - written);
@@ -147,12 +178,12 @@ void MapJournal::write(const std::vector<std::byte>& bytes) {
       const int error = errno;
       static_cast<void>(ftruncate(file_, static_cast<off_t>(sizes_[file_id_])));
       fail("cannot be written", error);
-      ++lost_;
-      return;
+      return false;
     }
     written += static_cast<std::size_t>(count);
   }
   sizes_[file_id_] += written;
+  return true;
 }
 
 std::string MapJournal::failure() const {
@@ -160,6 +191,11 @@ std::string MapJournal::failure() const {
 }
 
 void MapJournal::forget_dropped(const KeyframeClouds& clouds) {
+  std::erase_if(waiting_, [&](const Waiting& each) {
+    if (clouds.contains(each.id)) return false;
+    waiting_bytes_ -= each.bytes.size();
+    return true;
+  });
   std::erase_if(sizes_, [&](const auto& each) {
     if (clouds.contains(each.first)) return false;
     if (file_id_ == each.first) close_file();
@@ -169,7 +205,7 @@ void MapJournal::forget_dropped(const KeyframeClouds& clouds) {
 }
 
 void MapJournal::fail(const std::string& what, int error) {
-  failure_ = std::format("the map's journal {}: {}", what, std::strerror(error));
+  failure_ = std::format("the map's journal {}: {} ({})", what, std::strerror(error), folder_.path().string());
 }
 
 }  // namespace ignis

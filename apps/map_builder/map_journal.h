@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -20,8 +21,9 @@ namespace ignis {
 ///
 /// A record is handed to the kernel at once, so a killed process loses none; it is not synced, since after a power cut
 /// the drive is over. With a keyframe that the map has dropped its file goes, so the folder is bounded as the map is:
-/// 16 bytes a point. What cannot be written shows in failure(), and the map goes on without it. The records of a
-/// keyframe whose own is lost help nobody: restore() leaves them out.
+/// 16 bytes a point. What cannot be written shows in failure(), waits in memory up to a bound and is tried again with
+/// the next record; the map goes on. The records of a keyframe whose own is lost help nobody: restore() leaves them
+/// out.
 class MapJournal {
  public:
   struct Loaded {
@@ -52,7 +54,8 @@ class MapJournal {
   /// Removes the files of keyframes that the map no longer holds.
   void forget_dropped(const KeyframeClouds& clouds);
 
-  /// Why records are not in their files, and how many; empty while all are. What is lost is lost until begin().
+  /// Why records are not in their files, how many have no room in memory either, and where; empty while all are. What
+  /// is lost is lost until begin().
   [[nodiscard]] std::string failure() const;
 
  private:
@@ -65,16 +68,24 @@ class MapJournal {
 
   [[nodiscard]] static File read(const std::filesystem::path& path);
   [[nodiscard]] std::filesystem::path path_of(std::int32_t id) const;
+  struct Waiting {
+    std::int32_t id = 0;  ///< of the keyframe
+    std::vector<std::byte> bytes;
+  };
+
   void open_for(std::int32_t id);
   void close_file();
-  void write(const std::vector<std::byte>& bytes);
+  void write_waiting();
+  [[nodiscard]] bool write(const Waiting& record);
   void fail(const std::string& what, int error);
 
   runtime::StateFolder folder_;
   MapRecordHead head_;
   std::map<std::int32_t, std::size_t> sizes_;  ///< of the whole records in the files
   int file_ = -1;
-  std::int32_t file_id_ = 0;  ///< of the one that is open
+  std::int32_t file_id_ = 0;     ///< of the one that is open
+  std::deque<Waiting> waiting_;  ///< not in their files yet, in the order in which they came
+  std::size_t waiting_bytes_ = 0;
   std::string failure_;
   std::int64_t lost_ = 0;
   std::string damage_;  ///< of the last file that is not whole

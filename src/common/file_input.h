@@ -10,7 +10,8 @@
 
 namespace ignis {
 
-/// All bytes of a file; none when it cannot be read.
+/// All bytes of a file; none when it cannot be opened. Throws std::ios_base::failure when the disk does not give it
+/// back.
 [[nodiscard]] inline std::vector<std::byte> read_bytes(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   const std::vector<char> letters{std::istreambuf_iterator<char>(in), {}};

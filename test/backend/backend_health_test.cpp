@@ -48,6 +48,7 @@ TEST(BackendHealth, TellsTheWorstThatHasHappened) {
   EXPECT_EQ(health_of(situation).text, "waiting for keyframe 8");
   situation.journal_failure = "no space left";
   EXPECT_EQ(health_of(situation).text, "no space left");
+  EXPECT_EQ(health_of(situation).state, health_t::FAULT) << "it needs a person";
   situation.refusal = "keyframe 7 is damaged";
   EXPECT_EQ(health_of(situation).text, "keyframe 7 is damaged");
   EXPECT_EQ(health_of(situation).state, health_t::DEGRADED);

@@ -89,6 +89,7 @@ class FaultRun:
         names: tuple[str, ...] = ("map_builder", "graph_backend", "lio_frontend"),
         map_options: tuple[str | Path, ...] = (),
         frontend_options: tuple[str | Path, ...] = (),
+        backend_options: tuple[str | Path, ...] = (),
     ) -> None:
         self.seen = Seen()
         self.killed: set[str] = set()  # and not yet started again
@@ -96,7 +97,11 @@ class FaultRun:
         self.pipeline = Pipeline(folder, BUS)
         self.bus = open_bus(BUS)
         self._names = names
-        self._options = {"map_builder": ("--port", PORT, *map_options), "lio_frontend": frontend_options}
+        self._options = {
+            "map_builder": ("--port", PORT, *map_options),
+            "lio_frontend": frontend_options,
+            "graph_backend": backend_options,
+        }
         for channel, take in {
             "LIO_KEYFRAME": self._on_keyframe,
             "SMOOTHED_KEYFRAMES": self._on_revision,

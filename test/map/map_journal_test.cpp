@@ -104,14 +104,38 @@ class FullDisk {
   rlimit before_{};
 };
 
+TEST(Fault_L1, WhatTheMapsJournalCouldNotWriteIsWrittenOnceTheDiskTakesIt) {
+  const std::filesystem::path folder = test::fresh_folder();
+  {
+    MapJournal journal(folder);
+    journal.begin({.config_fingerprint = kConfig});
+    journal.append(record(0, true, 10));
+    {
+      const FullDisk disk(2000);
+      journal.append(record(0, false, 1000));
+      journal.append(record(0, false, 10));
+      journal.append(record(1, true, 10));
+    }
+    EXPECT_NE(journal.failure().find("cannot be written"), std::string::npos) << journal.failure();
+    EXPECT_NE(journal.failure().find(folder.string()), std::string::npos) << journal.failure();
+    journal.append(record(1, false, 10));
+    EXPECT_EQ(journal.failure(), "");
+  }
+  MapJournal journal(folder);
+  const auto loaded = journal.load(kConfig);
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->records.size(), 5U);
+  EXPECT_EQ(journal.damage(), "");
+}
+
 TEST(MapJournal, TellsALostRecordUntilItBeginsAnewThoughLaterOnesFit) {
+  constexpr std::size_t kPoints = 2'000'000;  // three of these are more than waits in memory
   const std::filesystem::path folder = test::fresh_folder();
   MapJournal journal(folder);
   journal.begin({.config_fingerprint = kConfig});
   {
     const FullDisk disk(2000);
-    journal.append(record(0, true, 1000));
-    journal.append(record(0, false, 10));
+    for (int i = 0; i < 3; ++i) journal.append(record(0, i == 0, kPoints));
   }
   EXPECT_NE(journal.failure().find("cannot be written"), std::string::npos) << journal.failure();
   EXPECT_NE(journal.failure().find("1 records are lost"), std::string::npos) << journal.failure();
@@ -119,6 +143,28 @@ TEST(MapJournal, TellsALostRecordUntilItBeginsAnewThoughLaterOnesFit) {
   EXPECT_NE(journal.failure(), "") << "what was lost is lost still";
   journal.begin({.config_fingerprint = kConfig, .session = 1});
   EXPECT_EQ(journal.failure(), "");
+}
+
+TEST(Fault_L1, AFileOfTheMapsJournalThatTheDiskDoesNotGiveCostsThatKeyframeAlone) {
+  const std::filesystem::path folder = test::fresh_folder();
+  const std::filesystem::path file = write_drive(folder)[1];
+  std::filesystem::remove(file);
+  std::filesystem::create_directory(file);  // it opens, and reading fails
+  MapJournal journal(folder);
+  const auto loaded = journal.load(kConfig);
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->records.size(), 6U);
+  EXPECT_EQ(journal.damage().find("map_keyframe_1: the disk does not give it back"), 0U) << journal.damage();
+}
+
+TEST(Fault_L1, AFileOfTheMapsJournalThatIsRemovedWhileItIsWrittenIsTold) {
+  const std::filesystem::path folder = test::fresh_folder();
+  MapJournal journal(folder);
+  journal.begin({.config_fingerprint = kConfig});
+  journal.append(record(0, true));
+  std::filesystem::remove(folder / "map_keyframe_0");
+  journal.append(record(0, false));
+  EXPECT_NE(journal.failure().find("was removed"), std::string::npos) << journal.failure();
 }
 
 }  // namespace
