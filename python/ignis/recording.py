@@ -2,7 +2,6 @@
 """A recording in progress: LCM's own logger, kept going over a full disk and its own death."""
 
 import argparse
-import contextlib
 import os
 import re
 import shutil
@@ -17,12 +16,15 @@ from ignis_lcm.ignis import health_t
 
 from ignis.bus import open_bus
 from ignis.errors import InputError
+from ignis.growing_pause import GrowingPause
+from ignis.last_words import LastWords
 from ignis.log_config import CONFIG_CHANNEL, encoded
 from ignis.log_tail import LogTail
 from ignis.mounts import effective_config
 from ignis.pipeline import program
 
 _STOP_S = 10.0
+_STOP_LOOK_S = 0.05
 _LEAST_LIFE_S = 2.0  # of a logger that is worth starting again
 _HEALTH_PERIOD_S = 1.0
 _ROOM_AGAIN = 1.2  # of --keep-free-mb
@@ -61,9 +63,9 @@ class Recording:
 
     A new file begins when the logger was killed, when the file was removed, when a disk that was nearly full has room
     again, when one that refused to be written to takes data again, and when a folder that was gone is back: what was
-    written is left as it is. While the disk is too full or refuses, or the folder is gone, HEALTH says FAULT; a logger
-    that was killed is succeeded at once, a successor that ended at once after two seconds. HEALTH says OK once a
-    successor has lived that long.
+    written is left as it is. A disk that refuses again and again is tried ever later. While the disk is too full or
+    refuses, or the folder is gone, HEALTH says FAULT; a logger that was killed is succeeded at once, a successor that
+    ended at once after two seconds. HEALTH says OK once a successor has lived that long.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -81,8 +83,7 @@ class Recording:
         self.interruptions: list[str] = []
         self._first = self.output
         self._finished: list[Path] = []
-        self._said = ""  # by the logger
-        self._refused = False  # the disk did not take what the logger wrote
+        self._pause = GrowingPause()  # of a disk that refuses
         self._full = False
         self._number = 0
         self._health_sequence = 0
@@ -93,13 +94,13 @@ class Recording:
 
     def _start_logger(self) -> None:
         self._started = time.monotonic()
+        self._refused = False  # the disk did not take what the logger wrote
         self.logger = subprocess.Popen(
             self._command(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
             start_new_session=True,
         )  # fmt: skip
-        self._said = ""
         assert self.logger.stderr is not None
-        os.set_blocking(self.logger.stderr.fileno(), False)
+        self._words = LastWords(self.logger.stderr)
 
     def _refuse_what_cannot_work(self) -> None:
         options = self._options
@@ -212,7 +213,7 @@ class Recording:
         if not self.folder.is_dir():
             return f"the folder {self.folder} is gone"
         if not self.paused:
-            self._refused = _REFUSED in self._words_of_logger()
+            self._note_refusal()
         self._full = self.free_mb() < keep * (_ROOM_AGAIN if self._full else 1.0)
         if self._full:
             return f"the disk has less than {keep:.0f} MB left"
@@ -220,24 +221,22 @@ class Recording:
             return f"the disk of {self.folder} takes no data: {refusal}"
         return None
 
-    def _words_of_logger(self) -> str:
-        """All that it has said so far; a logger whose words nobody takes stands still in the end."""
-        assert self.logger.stderr is not None
-        with contextlib.suppress(BlockingIOError):
-            while words := os.read(self.logger.stderr.fileno(), 4096):
-                self._said += words.decode(errors="replace")
-        return self._said
+    def _note_refusal(self) -> None:
+        refused = _REFUSED in self._words.take()
+        if refused and not self._refused:
+            self._pause.failed_after(time.monotonic() - self._started)
+        self._refused = self._refused or refused
 
     def _refusal(self) -> str:
         """Why the disk took nothing of what the logger wrote; empty when a new one is worth a try."""
-        if self.paused and time.monotonic() - self._started >= _LEAST_LIFE_S:
+        if self.paused and time.monotonic() - self._started >= self._pause.seconds:
             return refusal_by(self.folder)
-        return self._said.rpartition(_REFUSED)[2].partition("\n")[0] or "no reason was given"
+        return self._words.text.rpartition(_REFUSED)[2].partition("\n")[0] or "no reason was given"
 
     def _succeed_logger(self) -> str:
         """The logger has ended on its own. When it was the first one and ended at once, it cannot work at all."""
         code = self.logger.returncode
-        said = self._words_of_logger().strip().splitlines()
+        said = self._words.take().strip().splitlines()
         if not self.interruptions and time.monotonic() - self._started < _LEAST_LIFE_S:
             raise InputError(f"lcm-logger ended with code {code}: {(said or ['no message'])[-1]}")
         return self._interrupted(f"lcm-logger ended with code {code}")
@@ -294,9 +293,12 @@ class Recording:
     def _end_logger(self) -> None:
         if self.logger.poll() is None:
             self.logger.send_signal(signal.SIGINT)
-            try:
-                self.logger.wait(_STOP_S)
-            except subprocess.TimeoutExpired:
-                self.logger.kill()
-                self.logger.wait()
+            end = time.monotonic() + _STOP_S
+            while self.logger.poll() is None and time.monotonic() < end:
+                self._words.take()
+                if self._told is not None:
+                    self._tell(*self._told)
+                time.sleep(_STOP_LOOK_S)
+            self.logger.kill()
+            self.logger.wait()
         self.look()

@@ -35,6 +35,7 @@ MESSAGE = bytes(20_000)
 STRANGER_MB = 20  # more than there is
 FAULT_WITHIN_S = RESUMED_WITHIN_S = 1.0
 KILLS = 4
+SECOND_PAUSE_S = 4.5  # of 5 s
 LOSS_S = 0.1  # that a killed logger may cost
 
 
@@ -182,7 +183,7 @@ def test_fault_l1_a_recorder_whose_disk_breaks_says_so_and_goes_on_in_a_new_file
     private_network: None, failing_disk: tuple[Path, Path]
 ) -> None:
     folder, switch = failing_disk
-    log, second = folder / "drive.lcmlog", folder / "drive-2.lcmlog"
+    log, second, third = (folder / f"drive{part}.lcmlog" for part in ("", "-2", "-3"))
     with Recorder(log) as recorder:
         recorder.send_until(lambda: log.exists() and recorder.sent > 250)  # longer than a logger that ends at once
         switch.touch()
@@ -192,14 +193,57 @@ def test_fault_l1_a_recorder_whose_disk_breaks_says_so_and_goes_on_in_a_new_file
         assert not second.exists(), "one file, not one after the other that stays empty"
         switch.unlink()
         resumed = recorder.send_until(second.exists)
+        began = time.monotonic()
         recorder.send_until(lambda: recorder.says(health_t.OK) and second.stat().st_size > 1_500_000)
+        switch.touch()
+        recorder.send_until(lambda: recorder.says(health_t.FAULT))
+        switch.unlink()
+        recorder.send_until(third.exists)
+        paused = time.monotonic() - began
+        recorder.send_until(lambda: recorder.says(health_t.OK))
         code, said = recorder.end()
-    print(f"FAULT after {took:.2f} s, went on after {resumed:.2f} s")
+    print(f"FAULT after {took:.2f} s, went on after {resumed:.2f} s, and when it broke again {paused:.1f} s later")
     assert took < FAULT_WITHIN_S + BUSY_S and resumed < RESUMED_WITHIN_S + BUSY_S
+    assert paused > SECOND_PAUSE_S, "a disk that breaks again and again is tried ever later"
     assert code == 3 and f"the disk of {folder} takes no data: Input/output error: paused" in said
     early, late = numbers(log), numbers(second)
     assert len(early) > 200 and len(late) > 10 and early[-1] < said_at < late[0]
-    assert recorded_config(second) is not None and {path.name for path in folder.iterdir()} == {log.name, second.name}
+    assert recorded_config(second) is not None
+    assert {path.name for path in folder.iterdir()} == {log.name, second.name, third.name}
+
+
+STUBBORN_LOGGER = """#!/bin/bash
+# Finds its disk broken, is in no hurry to end, and says more than a pipe holds.
+trap '' INT
+log="${@: -1}"
+touch "$log"
+sleep 1
+echo 'lcm_eventlog_write_event: Input/output error' >&2
+sleep 4
+head -c 1000000 /dev/zero | tr '\\0' x >&2
+touch "$log.ended"
+"""
+
+
+def test_fault_l1_a_recorder_whose_logger_ends_slowly_and_loudly_speaks_all_the_while(
+    private_network: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bin").mkdir()
+    for program in (Path(os.environ["IGNIS_BUILD"]) / "bin").iterdir():
+        (tmp_path / "bin" / program.name).symlink_to(program)
+    logger = tmp_path / "bin" / "lcm-logger"
+    logger.write_text(STUBBORN_LOGGER)
+    logger.chmod(0o755)
+    monkeypatch.setenv("IGNIS_BUILD", str(tmp_path))
+    log = tmp_path / "drive.lcmlog"
+    ended = log.with_name(f"{log.name}.ended")
+    with Recorder(log) as recorder:
+        recorder.send_until(lambda: recorder.says(health_t.FAULT))
+        before = recorder.heard
+        took = recorder.send_until(ended.exists, seconds=8.0)
+        heard = recorder.heard - before
+    print(f"{heard} HEALTH messages in {took:.1f} s")
+    assert heard >= 0.7 * took - 1.0
 
 
 def test_fault_l1_a_folder_that_nothing_can_be_written_to_is_refused_with_path_and_free_space(
