@@ -214,7 +214,7 @@ void FrontendNode::tell_silence(LioStatus& status) const {
 /// A filter that bridges every gap is content; whoever drives must know that half of the margin is gone.
 void FrontendNode::tell_losses(LioStatus& status) {
   const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  imu_losses_.look(now_s, imu_counts_->received, imu_counts_->lost);
+  imu_losses_.look(now_s, imu_counts_->fresh, imu_counts_->lost);
   scan_losses_.look(now_s, scans_heard_, scan_counts_->lost + assembler_.incomplete());
   for (const std::string& trouble : {imu_losses_.trouble(), scan_losses_.trouble()}) {
     if (trouble.empty()) continue;

@@ -17,7 +17,8 @@ class LossWatch {
  public:
   explicit LossWatch(std::string channel) : channel_(std::move(channel)) {}
 
-  /// Takes the counts so far, at `now_s` of a clock that nobody sets.
+  /// Takes the counts so far, at `now_s` of a clock that nobody sets. `heard`: without repeats, of which a network that
+  /// doubles messages has as many as it likes.
   void look(double now_s, std::int64_t heard, std::int64_t lost) {
     if (!looks_.empty() && now_s - looks_.back().at_s < kStep_s) return;
     // More than any sensor sends: another sender with other numbers, or a jump in a log. Nothing is known of losses.

@@ -159,13 +159,13 @@ void ReplayInput::count_missing() {
   };
   for (const Entry& entry : entries_) {
     if (entry.kind == Kind::kScan) {
-      inventory_.missing_scans += missed(last_scan, scan_sequence.observe(entry.sequence), "of L1_SCAN");
+      inventory_.missing_scans += missed(last_scan, scan_sequence.observe(entry.sequence, entry.utime), "of L1_SCAN");
       const std::int64_t incomplete = assembler.incomplete();
       (void)assembler.add(entry);
       missed(last_scan, assembler.incomplete() - incomplete, "of L1_SCAN with a part");
       last_scan = entry.utime;
     } else if (entry.kind == Kind::kImu) {
-      inventory_.missing_imu += missed(last_imu, imu_sequence.observe(entry.sequence), "of L1_IMU");
+      inventory_.missing_imu += missed(last_imu, imu_sequence.observe(entry.sequence, entry.utime), "of L1_IMU");
       last_imu = entry.utime;
     }
   }

@@ -34,6 +34,7 @@ namespace ignis::runtime {
 struct ReceiverCounts {
   std::string channel;
   std::int64_t received = 0;
+  std::int64_t fresh = 0;        ///< of them those that are no repeats, late, or further parts; of one sender
   std::int64_t lost = 0;         ///< by the sender's running number, and scans or keyframes with a part missing
   std::int64_t rejected = 0;     ///< wrong type, or a length that contradicts the counts inside
   std::int64_t queue_drops = 0;  ///< skipped by this process because it was late
@@ -74,7 +75,10 @@ class LcmLink {
         if (!messages::numbering_is_possible(message)) return "its part number or its number of parts is impossible";
       }
       ++receiver.counts.received;
-      if (senders == Senders::kOne) receiver.counts.lost += receiver.sequence.observe(message.sequence);
+      if (senders == Senders::kOne) {
+        receiver.counts.lost += receiver.sequence.observe(message.sequence, message.utime);
+        receiver.counts.fresh = receiver.sequence.fresh();
+      }
       if constexpr (std::is_void_v<std::invoke_result_t<const Handler&, const Message&>>) {
         handler(message);
         return "";

@@ -88,14 +88,25 @@ TEST(LossWatch, TakesAnotherSenderOrAJumpInALogForNoLoss) {
 
 TEST(LossWatch, TellsNothingOfAChannelThatIsSilent) {
   LossWatch watch("L1_SCAN");
-  for (int second = 0; second < 10; ++second) watch.look(second, 100, 3);
-  EXPECT_EQ(watch.trouble(), "");
+  for (int second = 0; second < 10; ++second) {
+    watch.look(second, 100, 3);
+    EXPECT_EQ(watch.trouble(), "") << second;
+  }
 }
 
 TEST(LossWatch, TellsNothingOfAFewOfASlowChannel) {
   LossWatch watch("L1_SCAN");
   for (int second = 0; second < 10; ++second) watch.look(second, 5L * second, second);
   EXPECT_EQ(watch.trouble(), "");
+}
+
+TEST(LossWatch, TellsNothingOfAHandfulThoughItIsAllThereWas) {
+  LossWatch watch("L1_SCAN");
+  watch.look(0.0, 0, 0);
+  watch.look(1.0, 1, 4);
+  EXPECT_EQ(watch.trouble(), "");
+  watch.look(2.0, 1, 9);
+  EXPECT_NE(watch.trouble(), "");
 }
 
 }  // namespace
