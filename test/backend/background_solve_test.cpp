@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kSolve{5};
-const auto nobody = [] {};
+const auto kNobody = [] {};
 
 /// A solve that takes long, but looks often whether it is still wanted.
 ShadowOptimum slow_solve(const ShadowProblem&, const std::stop_token& stop, const GotOn&) {
@@ -35,9 +35,9 @@ TEST(BackgroundSolve, GivesWhatItHasBegunLast) {
     return optimum;
   });
   background.begin({});
-  EXPECT_EQ(background.take(nobody).keyframes, 7);
+  EXPECT_EQ(background.take(kNobody).keyframes, 7);
   background.begin({});
-  EXPECT_EQ(background.take(nobody).keyframes, 7) << "the earlier one was not stopped with it";
+  EXPECT_EQ(background.take(kNobody).keyframes, 7) << "the earlier one was not stopped with it";
 }
 
 TEST(BackgroundSolve, KeepsNobodyWaitingAtTheEnd) {
@@ -53,7 +53,7 @@ TEST(BackgroundSolve, KeepsNobodyWaitingForOneThatWasDropped) {
   const auto began = Clock::now();
   for (int i = 0; i < 3; ++i) background.begin({});
   background.drop();
-  static_cast<void>(background.take(nobody));
+  static_cast<void>(background.take(kNobody));
   EXPECT_LT(Clock::now() - began, kSolve / 2);
 }
 
