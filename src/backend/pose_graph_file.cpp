@@ -4,11 +4,14 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <format>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <unordered_set>
 
 #include "common/file_output.h"
@@ -21,6 +24,8 @@ constexpr const char* kVertex = "VERTEX_SE3:QUAT";
 constexpr const char* kEdge = "EDGE_SE3:QUAT";
 constexpr const char* kPlanarVertex = "VERTEX_SE2";
 constexpr const char* kPlanarEdge = "EDGE_SE2";
+constexpr const char* kParameters = "PARAMS_";  // of records other than these, which are refused
+constexpr const char* kByteOrderMark = "\xEF\xBB\xBF";
 constexpr double kRounding = 1e-6;  // of published files, relative to the largest eigenvalue
 
 /// Swaps the attitude and the position half of a symmetric matrix.
@@ -75,7 +80,7 @@ class RecordReader {
   }
   std::int32_t integer() {
     std::int32_t value = 0;
-    if (!(stream_ >> value)) fail("a whole number is missing");
+    if (!(stream_ >> value)) fail("a whole number of 32 bits is missing");
     return value;
   }
   double number() {
@@ -142,13 +147,39 @@ PoseGraphEdge read_edge(RecordReader& reader, bool planar, bool is_loop) {
   return edge;
 }
 
+/// The ends of all edges, ascending, where the edges put them: from the least known one on, breadth first.
+std::vector<KeyframePose> ends_of(const std::vector<PoseGraphEdge>& edges) {
+  std::map<std::int32_t, std::vector<const PoseGraphEdge*>> edges_at;
+  for (const PoseGraphEdge& edge : edges) {
+    edges_at[edge.from].push_back(&edge);
+    edges_at[edge.to].push_back(&edge);
+  }
+  std::map<std::int32_t, Pose> placed;
+  for (const auto& [first, unused] : edges_at) {
+    if (!placed.try_emplace(first).second) continue;
+    std::deque<std::int32_t> open{first};
+    for (; !open.empty(); open.pop_front()) {
+      const std::int32_t at = open.front();
+      for (const PoseGraphEdge* edge : edges_at.at(at)) {
+        const bool is_ahead = edge->from == at;
+        const Pose T_at_other = is_ahead ? edge->T_from_to : edge->T_from_to.inverse();
+        const std::int32_t other = is_ahead ? edge->to : edge->from;
+        if (placed.try_emplace(other, placed.at(at) * T_at_other).second) open.push_back(other);
+      }
+    }
+  }
+  std::vector<KeyframePose> ends;
+  for (const auto& [id, T_map_body] : placed) ends.push_back({id, T_map_body});
+  return ends;
+}
+
 /// Reads record after record into a graph.
 class GraphReader {
  public:
   explicit GraphReader(std::string file) : file_(std::move(file)) {}
 
-  void read(const std::string& line) {
-    ++line_;
+  void read(std::string line) {
+    if (++line_ == 1 && line.starts_with(kByteOrderMark)) line.erase(0, std::string_view(kByteOrderMark).size());
     RecordReader reader(line, where(line_));
     const std::string tag = reader.word();
     if (tag == kVertex || tag == kPlanarVertex) {
@@ -158,14 +189,18 @@ class GraphReader {
       note_kind(tag == kPlanarEdge, reader);
       graph_.edges.push_back(read_edge(reader, graph_.planar, loop_follows_));
       edge_lines_.push_back(line_);
-    } else if (!tag.empty() && tag[0] != '#' && tag != "FIX") {
+    } else if (!tag.empty() && tag[0] != '#' && tag != "FIX" && !tag.starts_with(kParameters)) {
       reader.fail("unknown record \"" + tag + '"');
     }
-    if (tag.contains("_SE")) reader.end();
+    if (tag.contains("_SE") && !tag.starts_with(kParameters)) reader.end();
     loop_follows_ = line.starts_with(kLoopMark);
   }
 
   PoseGraph finish() {
+    if (graph_.vertices.empty()) {
+      graph_.vertices = ends_of(graph_.edges);
+      return std::move(graph_);
+    }
     for (std::size_t i = 0; i < graph_.edges.size(); ++i) {
       for (const std::int32_t id : {graph_.edges[i].from, graph_.edges[i].to}) {
         if (known_.contains(id)) continue;

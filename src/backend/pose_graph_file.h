@@ -35,10 +35,12 @@ struct PoseGraph {
 void write_pose_graph(const std::filesystem::path& file, const PoseGraph& graph);
 void write_pose_graph(std::ostream& out, const PoseGraph& graph);
 
-/// Reads what write_pose_graph writes and the published graphs of that format, vertices and edges in any order. In a
-/// planar graph the three directions that SE2 does not know are held as tightly as the tightest that it knows. Throws
-/// std::runtime_error naming file, line and reason: unknown record, SE2 mixed with SE3, missing or non-finite number, a
-/// number too many, zero quaternion, information with a negative direction, edge to an unknown vertex or to itself.
+/// Reads what write_pose_graph writes and the published graphs of that format, vertices and edges in any order. Where a
+/// file has no vertex at all, these are the ends of its edges, ascending, placed along them. FIX and PARAMS_ records
+/// are passed over. In a planar graph the three directions that SE2 does not know are held as tightly as the tightest
+/// that it knows. Throws std::runtime_error naming file, line and reason: unknown record, SE2 mixed with SE3, missing
+/// or non-finite number, a number too many, zero quaternion, information with a negative direction, edge to an unknown
+/// vertex or to itself.
 [[nodiscard]] PoseGraph read_pose_graph(const std::filesystem::path& file);
 /// The same from a stream; `name` stands for the file in messages.
 [[nodiscard]] PoseGraph read_pose_graph(std::istream& in, const std::string& name);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <numbers>
 #include <random>
 #include <sstream>
 
@@ -107,6 +108,34 @@ TEST_F(PoseGraphFile, ReadsPlanarRecordsInAnyOrderAndWritesThemBack) {
   EXPECT_LT(body_difference(back.vertices[1].T_map_body, graph.vertices[1].T_map_body).norm(), 1e-12);
 }
 
+TEST_F(PoseGraphFile, PlacesVerticesThatOnlyEdgesNameAlongTheEdges) {
+  // 7 is met first from behind, and an edge that points back leads on to 3.
+  write_text("EDGE_SE2 7 5 1 0 1.5707963267948966 1 0 0 1 0 1\nEDGE_SE2 3 7 0 2 0 1 0 0 1 0 1\n");
+  const PoseGraph graph = read_pose_graph(file_);
+  ASSERT_EQ(graph.vertices.size(), 3U);
+  EXPECT_EQ(graph.vertices[0].id, 3);
+  EXPECT_EQ(graph.vertices[1].id, 5);
+  EXPECT_EQ(graph.vertices[2].id, 7);
+  EXPECT_LT(body_difference(graph.vertices[0].T_map_body, Pose()).norm(), 1e-12);
+  EXPECT_LT((graph.vertices[2].T_map_body.translation - Eigen::Vector3d(0.0, 2.0, 0.0)).norm(), 1e-12);
+  EXPECT_LT((graph.vertices[1].T_map_body.translation - Eigen::Vector3d(1.0, 2.0, 0.0)).norm(), 1e-12);
+  EXPECT_NEAR(so3::log(graph.vertices[1].T_map_body.rotation).z(), 0.5 * std::numbers::pi, 1e-12);
+}
+
+TEST_F(PoseGraphFile, ReadsWhatOtherToolsAndSystemsAddToIt) {
+  write_text(
+      "\xEF\xBB\xBF# written elsewhere\r\n\r\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\r\n"
+      "VERTEX_SE3:QUAT 4 0 0 0 0 0 0 1 \r\n\tVERTEX_SE3:QUAT  2 1E+00 -2.5e-1 +3 0 0 0.70711 -0.70711\r\nFIX 4\r\n"
+      "EDGE_SE3:QUAT 4 2 1 0 0 0 0 0 -1 1e6 0 0 0 0 0 1e6 0 0 0 0 1e-9 0 0 0 4e4 0 0 4e4 0 4e4\r\n");
+  const PoseGraph graph = read_pose_graph(file_);
+  ASSERT_EQ(graph.vertices.size(), 2U);
+  EXPECT_EQ(graph.vertices[1].T_map_body.translation, Eigen::Vector3d(1.0, -0.25, 3.0));
+  EXPECT_NEAR(so3::log(graph.vertices[1].T_map_body.rotation).z(), -0.5 * std::numbers::pi, 1e-12);
+  ASSERT_EQ(graph.edges.size(), 1U);
+  EXPECT_NEAR(so3::log(graph.edges[0].T_from_to.rotation).norm(), 0.0, 1e-12);
+  EXPECT_EQ(graph.edges[0].information(5, 5), 1e-9);
+}
+
 TEST_F(PoseGraphFile, NamesFileLineAndReason) {
   EXPECT_TRUE(contains(complaint(), "cannot be opened"));
   write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 0 0 nan 0 0 0 1\n");
@@ -120,6 +149,8 @@ TEST_F(PoseGraphFile, NamesFileLineAndReason) {
       "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nEDGE_SE3:QUAT 0 7 0 0 0 0 0 0 1 "
       "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n");
   EXPECT_TRUE(contains(complaint(), ":2: the edge names an unknown vertex, 7"));
+  write_text("VERTEX_SE2 6989586621679009792 0 0 0\n");
+  EXPECT_TRUE(contains(complaint(), ":1: a whole number of 32 bits is missing"));
   write_text("VERTEX_XY 0 0 0\n");
   EXPECT_TRUE(contains(complaint(), "VERTEX_XY"));
   write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE2 1 0 0 0\n");
