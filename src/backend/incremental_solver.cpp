@@ -22,6 +22,8 @@ Isam2Settings settings(const SolverConfig& config) {
   pose << gtsam::Vector3::Constant(config.relinearize_rotation_rad),
       gtsam::Vector3::Constant(config.relinearize_position_m);
   settings.thresholds['x'] = pose;
+  settings.thresholds['p'] =
+      gtsam::Vector3(config.relinearize_position_m, config.relinearize_position_m, config.relinearize_rotation_rad);
   settings.thresholds['v'] = gtsam::Vector3::Constant(config.relinearize_velocity);
   settings.thresholds['b'] = gtsam::Vector6::Constant(config.relinearize_bias);
   settings.relinearize_skip = config.relinearize_skip;

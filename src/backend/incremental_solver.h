@@ -65,7 +65,7 @@ struct SolverSummary {
 /// survives its own exceptions. GTSAM's object is unusable after one, so factors and values are kept here as well; when
 /// a batch makes it throw, a fresh iSAM2 is built from everything but that batch. Deterministic; for one thread.
 ///
-/// Pose variables have the letter x, velocities v, biases b.
+/// Pose variables have the letter x, velocities v, biases b; poses in the plane p.
 class IncrementalSolver {
  public:
   explicit IncrementalSolver(const SolverConfig& config);

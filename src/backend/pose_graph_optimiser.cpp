@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backend/pose_graph_optimiser.h"
 
-#include <gtsam/geometry/Pose3.h>
-#include <gtsam/inference/Symbol.h>
 #include <gtsam/nonlinear/LevenbergMarquardtOptimizer.h>
 #include <gtsam/nonlinear/NonlinearFactorGraph.h>
-#include <gtsam/nonlinear/PriorFactor.h>
 #include <gtsam/nonlinear/Values.h>
 
 #include <algorithm>
@@ -16,31 +13,36 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "backend/gtsam_conversion.h"
-#include "backend/relative_pose_factor.h"
+#include "backend/chordal_start.h"
 
 namespace ignis {
 namespace {
 
-using gtsam::symbol_shorthand::X;
-
 constexpr int kFinalSteps = 3;                // Gauss-Newton steps over the whole graph once everything is in
-constexpr std::size_t kFinalBatchSteps = 20;  // at most, from there
-constexpr double kHoldSigma = 1e-6;
-constexpr std::size_t kNamedVertices = 5;  // of those that hang in the air
+constexpr std::size_t kFinalBatchSteps = 50;  // at most, from there
+constexpr double kSameMinimum = 1e-6;         // relative difference of two costs that is none
+constexpr std::size_t kNamedVertices = 5;     // of those that hang in the air
 constexpr std::size_t kBatchIterations = 100;
 constexpr double kBatchRelativeDecrease = 1e-9;
 
-gtsam::Key key_of(std::int32_t id) { return X(static_cast<std::uint32_t>(id)); }
-
-boost::shared_ptr<gtsam::NonlinearFactor> factor_of(const PoseGraphEdge& edge) {
-  return make_relative_pose_factor(key_of(edge.from), key_of(edge.to), edge.T_from_to, whitening(edge.information));
-}
-
 std::int32_t other_end(const PoseGraphEdge& edge, std::int32_t id) { return edge.from == id ? edge.to : edge.from; }
 
-void add_hold(const KeyframePose& first, gtsam::NonlinearFactorGraph& factors) {
-  factors.addPrior(key_of(first.id), to_gtsam(first.T_map_body), gtsam::noiseModel::Isotropic::Sigma(6, kHoldSigma));
+/// Levenberg-Marquardt from `values` until it goes no lower or `goes_on` says no; then false.
+bool descend(gtsam::NonlinearFactorGraph factors, const gtsam::NonlinearFactor::shared_ptr& hold, gtsam::Values& values,
+             const std::function<bool(double)>& goes_on) {
+  factors.push_back(hold);
+  gtsam::LevenbergMarquardtOptimizer optimiser(factors, values);
+  double before = optimiser.error();
+  bool is_wanted = true;
+  while (is_wanted && optimiser.iterations() < kBatchIterations) {
+    optimiser.iterate();
+    const double now = optimiser.error();
+    is_wanted = goes_on(now);
+    if (before - now <= kBatchRelativeDecrease * before) break;
+    before = now;
+  }
+  values = optimiser.values();
+  return is_wanted;
 }
 
 std::string unreachable(const PoseGraph& graph, const std::vector<bool>& reached) {
@@ -88,39 +90,56 @@ std::vector<PoseGraphOptimiser::Entry> PoseGraphOptimiser::entry_order(const Pos
 }
 
 PoseGraphOptimiser::PoseGraphOptimiser(const PoseGraph& graph, const SolverConfig& config)
-    : graph_(graph), relinearize_skip_(config.relinearize_skip), order_(entry_order(graph)), solver_(config) {
+    : graph_(graph),
+      variables_(graph.planar),
+      relinearize_skip_(config.relinearize_skip),
+      order_(entry_order(graph)),
+      solver_(config) {
   place_in_entry_.reserve(order_.size());
 }
 
 void PoseGraphOptimiser::add_next() {
   assert(!complete());
   const Entry& entry = order_[entered_];
-  const std::int32_t id = graph_.vertices[entry.vertex].id;
+  const KeyframePose& vertex = graph_.vertices[entry.vertex];
   gtsam::NonlinearFactorGraph factors;
   gtsam::Values values;
   if (entered_ == 0) {
-    values.insert(key_of(id), to_gtsam(graph_.vertices[entry.vertex].T_map_body));
-    add_hold(graph_.vertices[entry.vertex], factors);
+    variables_.insert(vertex.id, vertex.T_map_body, values);
+    factors.push_back(variables_.hold_of(vertex));
   } else {
-    const auto when_it_came = [&](const PoseGraphEdge* edge) { return place_in_entry_.at(other_end(*edge, id)); };
+    const auto when_it_came = [&](const PoseGraphEdge* edge) {
+      return place_in_entry_.at(other_end(*edge, vertex.id));
+    };
     const PoseGraphEdge& latest = **std::ranges::max_element(entry.edges, {}, when_it_came);
-    const gtsam::Pose3 T_from_to = to_gtsam(latest.T_from_to);
-    values.insert(key_of(id),
-                  solver_.pose(key_of(other_end(latest, id))) * (latest.to == id ? T_from_to : T_from_to.inverse()));
-    for (const PoseGraphEdge* edge : entry.edges) factors.push_back(factor_of(*edge));
+    const Pose T_known_new = latest.to == vertex.id ? latest.T_from_to : latest.T_from_to.inverse();
+    variables_.insert(vertex.id, pose(other_end(latest, vertex.id)) * T_known_new, values);
+    for (const PoseGraphEdge* edge : entry.edges) factors.push_back(variables_.factor_of(*edge));
   }
   const SolverOutcome outcome = solver_.add(factors, values);
-  if (!outcome.accepted) throw std::runtime_error(std::format("vertex {}: {}", id, outcome.reason));
-  place_in_entry_[id] = entered_++;
+  if (!outcome.accepted) throw std::runtime_error(std::format("vertex {}: {}", vertex.id, outcome.reason));
+  place_in_entry_[vertex.id] = entered_++;
+}
+
+Pose PoseGraphOptimiser::pose(std::int32_t id) {
+  const std::uint64_t key = variables_.key_of(id);
+  return variables_.pose_in(solver_.estimate_of(std::span(&key, 1)), id);
 }
 
 PoseGraphSolution PoseGraphOptimiser::finish() {
   assert(complete());
   solver_.settle(kFinalSteps * relinearize_skip_);
-  PoseGraph settled = graph_;
-  for (KeyframePose& vertex : settled.vertices) vertex.T_map_body = from_gtsam(solver_.pose(key_of(vertex.id)));
+  const auto for_a_while = [](std::size_t iteration, double) { return iteration < kFinalBatchSteps; };
+  PoseGraph start = graph_;
+  for (KeyframePose& vertex : start.vertices) vertex.T_map_body = pose(vertex.id);
   // Linearisation points may still lie within the solver's thresholds of where they should be.
-  return optimise_in_batch(settled, [](std::size_t iteration, double) { return iteration < kFinalBatchSteps; });
+  PoseGraphSolution incremental = optimise_in_batch(start, for_a_while);
+  start.vertices = chordal_start(graph_);
+  if (start.vertices.empty()) return incremental;
+  PoseGraphSolution relaxed = optimise_in_batch(start, for_a_while);
+  if (relaxed.half_chi_square >= incremental.half_chi_square * (1.0 - kSameMinimum)) return incremental;
+  relaxed.is_relaxed = true;
+  return relaxed;
 }
 
 PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config) {
@@ -132,25 +151,24 @@ PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig
 PoseGraphSolution optimise_in_batch(const PoseGraph& graph, const BatchObserver& observer) {
   PoseGraphSolution solution;
   if (graph.vertices.empty()) return solution;
-  gtsam::NonlinearFactorGraph edges;
+  const PoseGraphVariables variables(graph.planar);
   gtsam::Values values;
-  for (const KeyframePose& vertex : graph.vertices) values.insert(key_of(vertex.id), to_gtsam(vertex.T_map_body));
-  for (const PoseGraphEdge& edge : graph.edges) edges.push_back(factor_of(edge));
-  gtsam::NonlinearFactorGraph held = edges;
-  add_hold(graph.vertices.front(), held);
-  gtsam::LevenbergMarquardtOptimizer optimiser(held, values);
-  double before = optimiser.error();
-  while (optimiser.iterations() < kBatchIterations) {
-    optimiser.iterate();
-    const double now = optimiser.error();
-    if (!observer(optimiser.iterations(), now)) break;
-    if (before - now <= kBatchRelativeDecrease * before) break;
-    before = now;
+  for (const KeyframePose& vertex : graph.vertices) variables.insert(vertex.id, vertex.T_map_body, values);
+  gtsam::NonlinearFactorGraph factors;
+  gtsam::NonlinearFactorGraph costs;
+  for (const PoseGraphEdge& edge : graph.edges) {
+    factors.push_back(variables.factor_of(edge));
+    costs.push_back(variables.cost_of(edge));
   }
+  const auto hold = variables.hold_of(graph.vertices.front());
+  std::size_t iterations = 0;
+  const auto count = [&](double half_chi_square) { return observer(++iterations, half_chi_square); };
+  const bool goes_on = descend(factors, hold, values, count);
+  if (goes_on && graph.planar) descend(costs, hold, values, count);
   for (const KeyframePose& vertex : graph.vertices) {
-    solution.poses.push_back({vertex.id, from_gtsam(optimiser.values().at<gtsam::Pose3>(key_of(vertex.id)))});
+    solution.poses.push_back({vertex.id, variables.pose_in(values, vertex.id)});
   }
-  solution.half_chi_square = edges.error(optimiser.values());
+  solution.half_chi_square = costs.error(values);
   return solution;
 }
 

@@ -8,12 +8,14 @@
 
 #include "backend/incremental_solver.h"
 #include "backend/pose_graph_file.h"
+#include "backend/pose_graph_variables.h"
 
 namespace ignis {
 
 struct PoseGraphSolution {
   std::vector<KeyframePose> poses;  ///< in the order of the graph's vertices
   double half_chi_square = 0.0;     ///< of the edges alone
+  bool is_relaxed = false;          ///< reached from the chordal relaxation, not from where the solver stood
 };
 
 /// Solves a graph of relative poses incrementally, as the back end does on the vehicle: a pose enters when an edge
@@ -33,7 +35,8 @@ class PoseGraphOptimiser {
   void add_next();
 
   /// Settles the whole graph: updates without news, then batch steps from where they end, as the back end swaps in its
-  /// batch optimum. Requires complete().
+  /// batch optimum. Where edges err by a tenth of a radian and more, pose by pose may have led into a wrong minimum;
+  /// so batch steps from the chordal relaxation are tried as well, and the lower cost stands. Requires complete().
   [[nodiscard]] PoseGraphSolution finish();
 
  private:
@@ -45,7 +48,10 @@ class PoseGraphOptimiser {
 
   [[nodiscard]] static std::vector<Entry> entry_order(const PoseGraph& graph);
 
+  [[nodiscard]] Pose pose(std::int32_t id);
+
   const PoseGraph& graph_;
+  PoseGraphVariables variables_;
   int relinearize_skip_;
   std::vector<Entry> order_;
   std::unordered_map<std::int32_t, std::size_t> place_in_entry_;  ///< of the ids that are in: how many came before
