@@ -32,8 +32,8 @@ BackendHealth health_of(const BackendSituation& situation) {
             std::format("the graph takes no more keyframes: {}; a restart or a new session begins a new graph",
                         graph.solver_failure)};
   }
-  if (!situation.refusal.empty()) return {health_t::DEGRADED, situation.refusal};
   if (!situation.journal_failure.empty()) return {health_t::FAULT, situation.journal_failure};
+  if (!situation.refusal.empty()) return {health_t::DEGRADED, situation.refusal};
   if (situation.waiting_for) {
     return {health_t::DEGRADED, std::format("waiting for keyframe {}", *situation.waiting_for)};
   }

@@ -67,7 +67,7 @@ JournalFile::JournalFile(fs::path folder)
 
 JournalFile::~JournalFile() {
   if (file_ < 0) return;
-  write_pending();
+  write_all_pending();
   fdatasync(file_);
   close(file_);
 }
@@ -105,7 +105,7 @@ fs::path JournalFile::free_name(const char* suffix) const {
 
 fs::path JournalFile::set_aside() {
   if (file_ >= 0) {
-    write_pending();
+    write_all_pending();
     sync_.leave();
     close(file_);
     file_ = -1;
@@ -135,17 +135,27 @@ void JournalFile::begin(const JournalHead& head) {
 void JournalFile::resume(const LoadedJournal& loaded, std::size_t records, bool keep_file) {
   ends_.clear();
   for (std::size_t i = 0; i <= records; ++i) ends_.push_back(loaded.end_of(i));
-  std::error_code error;
-  if (keep_file) fs::rename(path_, free_name("damaged"), error);
-  if (!keep_file || error) {
+  if (!keep_file) {
     open(0, ends_.back());
     return;
+  }
+  std::error_code renaming;
+  fs::rename(path_, free_name("damaged"), renaming);
+  if (renaming) {
+    throw runtime::UserError(
+        std::format("{}: cannot be renamed, and is damaged: {}", path_.string(), renaming.message()), runtime::kFailed);
   }
   // The old one may not even be read to its end, so what is used of it goes into another one.
   open(O_CREAT | O_TRUNC, 0);
   const std::span<const std::byte> used = loaded.bytes().first(ends_.back());
+  int error = write_file(0, used);
+  if (error == 0 && fdatasync(file_) != 0) error = errno;
+  if (error == 0) {
+    size_ = used.size();
+    return;
+  }
   pending_.assign(used.begin(), used.end());
-  while (!pending_.empty() && failure_.empty()) write_pending();
+  fail("cannot be written", error);
 }
 
 void JournalFile::open(int flags, std::size_t size) {
@@ -167,7 +177,8 @@ void JournalFile::give_up() {
   unsynced_.clear();
   sync_.leave();
   std::erase_if(ends_, [this](std::size_t end) { return end > size_; });
-  failure_ += "; given up for this drive";
+  const std::string why = failure();
+  failure_ = (why.empty() ? failure_text("is written slower than it grows") : why) + "; given up for this drive";
 }
 
 void JournalFile::add_pending(std::span<const std::byte> bytes) {
@@ -219,9 +230,13 @@ void JournalFile::return_to_folder() {
   if (file_ >= 0) {
     if (fstat(file_, &ours) != 0 || (!is_there && !is_missing)) return;  // nobody knows
     if (is_there && ours.st_ino == there.st_ino && ours.st_dev == there.st_dev) return;
-    std::vector<std::byte> held(size_);
     fail("was removed", ENOENT);
-    if (held.size() + pending_.size() > kMaxPending || !read_file(0, held)) {
+    if (size_ + pending_.size() > kMaxPending) {
+      give_up();
+      return;
+    }
+    std::vector<std::byte> held(size_);
+    if (!read_file(0, held)) {
       give_up();
       return;
     }
@@ -265,28 +280,38 @@ void JournalFile::note(const BackgroundSync::Outcome& outcome) {
   unsynced_why_ = failure_text(std::format("cannot be synced: {}", std::strerror(outcome.error)));
 }
 
+/// The number of the error, or 0.
+int JournalFile::write_file(std::size_t offset, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return errno;
+    offset += static_cast<std::size_t>(count);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return 0;
+}
+
+void JournalFile::write_all_pending() {
+  do write_pending();
+  while (file_ >= 0 && !pending_.empty() && failure_.empty());
+}
+
 /// Whole records, some at once, or nothing.
 void JournalFile::write_pending() {
   if (file_ < 0 || pending_.empty()) return;
   const auto first = std::ranges::upper_bound(ends_, size_);
   const auto beyond = std::ranges::upper_bound(ends_, size_ + kMostAtOnce);
   const std::size_t all = *(beyond > first ? beyond - 1 : first) - size_;
-  std::size_t written = 0;
-  while (written < all) {
-    const ssize_t count = pwrite(file_, pending_.data() + written, all - written, static_cast<off_t>(size_ + written));
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      const int error = errno;
-      // Left in place, a torn record would only be overwritten by the next attempt.
-      static_cast<void>(ftruncate(file_, static_cast<off_t>(size_)));
-      last_try_ = std::chrono::steady_clock::now();
-      fail("cannot be written", error);
-      return;
-    }
-    written += static_cast<std::size_t>(count);
+  if (const int error = write_file(size_, std::span(pending_).first(all)); error != 0) {
+    // Left in place, a torn record would only be overwritten by the next attempt.
+    static_cast<void>(ftruncate(file_, static_cast<off_t>(size_)));
+    last_try_ = std::chrono::steady_clock::now();
+    fail("cannot be written", error);
+    return;
   }
-  size_ += written;
-  const auto end = pending_.begin() + static_cast<std::ptrdiff_t>(written);
+  size_ += all;
+  const auto end = pending_.begin() + static_cast<std::ptrdiff_t>(all);
   unsynced_.insert(unsynced_.end(), pending_.begin(), end);
   pending_.erase(pending_.begin(), end);
   failure_.clear();

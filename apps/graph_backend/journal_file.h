@@ -72,6 +72,8 @@ class JournalFile : public RecordArchive {
 
  private:
   void open(int flags, std::size_t size);
+  int write_file(std::size_t offset, std::span<const std::byte> bytes);
+  void write_all_pending();
   void add_pending(std::span<const std::byte> bytes);
   void write_pending();
   void give_up();

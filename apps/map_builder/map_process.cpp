@@ -340,8 +340,8 @@ std::string MapProcess::trouble() {
   const bool loss = given_up_.look(hud_.keyframes_given_up, now);
   // A long drive drops clouds by and by: that it begins to is news, what follows stands beside OK.
   const bool first_drop = drops_.look(std::min<std::int64_t>(map_.clouds().dropped(), 1), now);
-  if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
   if (std::string failure = lasting_.failure(); !failure.empty()) return failure;
+  if (map_.voxels().coarsening() > 0) return "map.max_voxels is reached, the finest level is left out";
   if (std::string missing = missed_.trouble(now_s()); !missing.empty()) return missing;
   if (!journal_damage_.empty() && now_s() - journal_damage_s_ < MissedScans::kTold_s) return journal_damage_;
   if (session_trouble) {

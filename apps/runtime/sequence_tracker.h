@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -23,7 +24,7 @@ class SequenceTracker {
     if (!is_news && !begins_anew) return 0;
     const std::int64_t missed = newest_ && is_news ? std::int64_t{sequence} - *newest_ - 1 : 0;
     newest_ = sequence;
-    newest_utime_ = utime;
+    newest_utime_ = begins_anew ? utime : std::max(newest_utime_, utime);
     ++fresh_;
     return missed;
   }

@@ -192,7 +192,7 @@ class GraphReader {
     } else if (!tag.empty() && tag[0] != '#' && tag != "FIX" && !tag.starts_with(kParameters)) {
       reader.fail("unknown record \"" + tag + '"');
     }
-    if (tag.contains("_SE") && !tag.starts_with(kParameters)) reader.end();
+    if (tag.contains("_SE") && tag[0] != '#' && !tag.starts_with(kParameters)) reader.end();
     loop_follows_ = line.starts_with(kLoopMark);
   }
 

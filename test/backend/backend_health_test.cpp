@@ -46,12 +46,12 @@ TEST(BackendHealth, TellsTheWorstThatHasHappened) {
   EXPECT_EQ(health_of(situation).text, "3 keyframes are given up; the graph has holes there");
   situation.waiting_for = 8;
   EXPECT_EQ(health_of(situation).text, "waiting for keyframe 8");
-  situation.journal_failure = "no space left";
-  EXPECT_EQ(health_of(situation).text, "no space left");
-  EXPECT_EQ(health_of(situation).state, health_t::FAULT) << "it needs a person";
   situation.refusal = "keyframe 7 is damaged";
   EXPECT_EQ(health_of(situation).text, "keyframe 7 is damaged");
   EXPECT_EQ(health_of(situation).state, health_t::DEGRADED);
+  situation.journal_failure = "no space left";
+  EXPECT_EQ(health_of(situation).text, "no space left");
+  EXPECT_EQ(health_of(situation).state, health_t::FAULT) << "it needs a person";
   situation.graph.solver_failure = "it is singular";
   EXPECT_NE(health_of(situation).text.find("it is singular"), std::string::npos);
   EXPECT_EQ(health_of(situation).state, health_t::FAULT);

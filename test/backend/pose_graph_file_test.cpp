@@ -124,7 +124,7 @@ TEST_F(PoseGraphFile, PlacesVerticesThatOnlyEdgesNameAlongTheEdges) {
 
 TEST_F(PoseGraphFile, ReadsWhatOtherToolsAndSystemsAddToIt) {
   write_text(
-      "\xEF\xBB\xBF# written elsewhere\r\n\r\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\r\n"
+      "\xEF\xBB\xBF# written elsewhere\r\n#EDGE_SE3:QUAT 4 2 left out\r\n\r\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\r\n"
       "VERTEX_SE3:QUAT 4 0 0 0 0 0 0 1 \r\n\tVERTEX_SE3:QUAT  2 1E+00 -2.5e-1 +3 0 0 0.70711 -0.70711\r\nFIX 4\r\n"
       "EDGE_SE3:QUAT 4 2 1 0 0 0 0 0 -1 1e6 0 0 0 0 0 1e6 0 0 0 0 1e-9 0 0 0 4e4 0 0 4e4 0 4e4\r\n");
   const PoseGraph graph = read_pose_graph(file_);
