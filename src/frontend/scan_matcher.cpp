@@ -117,10 +117,9 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
         unmatched_.push_back(points[i]);
         continue;
       }
-      const Eigen::Vector3d point_body = points[i].cast<double>();
       const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
       const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);
-      constraints_.push_back({point_body, plane, distance, smoothness, smoothness, 1.0});
+      constraints_.push_back({points[i].cast<double>(), plane, distance, smoothness, smoothness, 1.0});
     }
   }
   leave_out_moving_surfaces(map.scans());
