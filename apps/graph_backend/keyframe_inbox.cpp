@@ -52,9 +52,7 @@ bool KeyframeInbox::put(Keyframe keyframe, std::int32_t expected, Time now) {
 
 std::optional<Keyframe> KeyframeInbox::take(std::int32_t expected) {
   if (waiting_.empty() || waiting_.begin()->first > expected) return std::nullopt;
-  Keyframe keyframe = std::move(waiting_.begin()->second);
-  waiting_.erase(waiting_.begin());
-  return keyframe;
+  return std::move(waiting_.extract(waiting_.begin()).mapped());
 }
 
 std::vector<std::int32_t> KeyframeInbox::ids_to_request(std::int32_t expected, Time now) {

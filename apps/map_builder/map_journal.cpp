@@ -23,6 +23,9 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPrefix = "map_keyframe_";
 constexpr std::size_t kMostWaiting = 64U << 20U;  // [bytes] for a disk that takes none: half an hour of driving
+// [bytes] written by one append: a second of a card that takes 4 MB/s, so that a disk which works again does not keep the
+// map from saying that it lives.
+constexpr std::size_t kMostAtOnce = 4U << 20U;
 
 std::vector<fs::path> files_of(const fs::path& folder) {
   std::vector<fs::path> paths;
@@ -42,7 +45,10 @@ void remove_file(const fs::path& path) {
 
 MapJournal::MapJournal(fs::path folder) : folder_(std::move(folder), "map_builder", "journal") {}
 
-MapJournal::~MapJournal() { close_file(); }
+MapJournal::~MapJournal() {
+  write_waiting(kMostWaiting);
+  close_file();
+}
 
 MapJournal::File MapJournal::read(const fs::path& path) {
   File file;
@@ -151,12 +157,15 @@ void MapJournal::append(const MapRecord& record) {
     waiting_bytes_ += waiting.bytes.size();
     waiting_.push_back(std::move(waiting));
   }
-  write_waiting();
+  write_waiting(kMostAtOnce);
 }
 
-void MapJournal::write_waiting() {
+/// At least one, if the disk takes it; no further one once `most` bytes are written.
+void MapJournal::write_waiting(std::size_t most) {
+  std::size_t written = 0;
   while (!waiting_.empty()) {
-    if (!write(waiting_.front())) return;
+    if (written >= most || !write(waiting_.front())) return;
+    written += waiting_.front().bytes.size();
     waiting_bytes_ -= waiting_.front().bytes.size();
     waiting_.pop_front();
   }

@@ -22,7 +22,7 @@ namespace ignis {
 /// A record is handed to the kernel at once, so a killed process loses none; it is not synced, since after a power cut
 /// the drive is over. With a keyframe that the map has dropped its file goes, so the folder is bounded as the map is:
 /// 16 bytes a point. What cannot be written shows in failure(), waits in memory up to a bound and is tried again with
-/// the next record; the map goes on. The records of a keyframe whose own is lost help nobody: restore() leaves them
+/// the next records, a few megabytes with each, and at the end; the map goes on. The records of a keyframe whose own is lost help nobody: restore() leaves them
 /// out.
 class MapJournal {
  public:
@@ -75,7 +75,7 @@ class MapJournal {
 
   void open_for(std::int32_t id);
   void close_file();
-  void write_waiting();
+  void write_waiting(std::size_t most);
   [[nodiscard]] bool write(const Waiting& record);
   void fail(const std::string& what, int error);
 

@@ -37,6 +37,7 @@ void transfer(auto& io, FieldsOf<KeyframeLink> auto& link) {
   transfer(io, link.guess);
   transfer(io, link.T_previous_this);
   io.matrix(link.odometry);
+  io.maybe(link.sighted);
   io.maybe(link.imu);
 }
 

@@ -13,7 +13,7 @@
 /// record is that of common/byte_record.h, its payload what ChangeTracker makes. Files stand in apps/graph_backend.
 namespace ignis {
 
-inline constexpr std::uint32_t kJournalVersion = 8;
+inline constexpr std::uint32_t kJournalVersion = 9;
 
 /// What a journal belongs to. Another version, configuration or session makes it useless to a back end.
 struct JournalHead {

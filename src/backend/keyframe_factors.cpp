@@ -19,6 +19,7 @@
 #include "backend/open_shifts.h"
 #include "backend/preintegration.h"
 #include "backend/relative_pose_factor.h"
+#include "backend/sighted_speed_factor.h"
 #include "backend/start_tilt_factor.h"
 
 namespace ignis {
@@ -100,6 +101,15 @@ NavState placed(NavState state, const Pose& T_map_odom) {
   return state;
 }
 
+/// Where the filter would be, had it not corrected itself by what walls in sight told. The graph is told the same.
+NavState as_moved(const Keyframe& keyframe) {
+  NavState state = keyframe.state;
+  if (!keyframe.sighted) return state;
+  state.T_odom_body.translation -= state.T_odom_body.rotation * keyframe.sighted->position_step;
+  state.v_odom -= state.T_odom_body.rotation * keyframe.sighted->velocity_step;
+  return state;
+}
+
 /// Shifts that the interval's scans leave open, in body axes of its start.
 Eigen::Matrix3d open_between(const Pose& T_previous_this, const Matrix6d& scan_information) {
   const Eigen::Matrix3d R = T_previous_this.rotation.toRotationMatrix();
@@ -125,8 +135,10 @@ KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool u
   link.previous_id = previous.id;
   link.stationary = keyframe.stationary;
   link.interval_s = seconds_between(previous.filter.utime, keyframe.state.utime);
-  link.T_previous_this = previous.filter.T_odom_body.inverse() * keyframe.state.T_odom_body;
+  const NavState moved = as_moved(keyframe);
+  link.T_previous_this = previous.filter.T_odom_body.inverse() * moved.T_odom_body;
   link.odometry = odometry;
+  link.sighted = keyframe.sighted;
   const Pose T_map_odom = previous.estimate.T_odom_body * previous.filter.T_odom_body.inverse();
   link.guess = previous.estimate;
   link.guess.T_odom_body = previous.estimate.T_odom_body * link.T_previous_this;
@@ -135,7 +147,7 @@ KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool u
     const ImuSum sum = plain_sum(
         preintegrate(keyframe.imu, previous.filter.utime, keyframe.state.utime, previous.estimate, config.imu));
     link.imu = agreeing_along(open_between(link.T_previous_this, keyframe.scan_information),
-                              placed(previous.filter, T_map_odom), placed(keyframe.state, T_map_odom),
+                              placed(previous.filter, T_map_odom), placed(moved, T_map_odom),
                               config.imu.gravity, sum);
   }
   return link;
@@ -155,6 +167,7 @@ void add_link_factors(const KeyframeLink& link, const BackendConfig& config, gts
   if (link.odometry.rows() > 0) {
     factors.push_back(make_relative_pose_factor(X(link.previous_id), X(link.id), link.T_previous_this, link.odometry));
   }
+  if (link.sighted) factors.push_back(make_sighted_speed_factor(X(link.id), V(link.id), *link.sighted));
   if (link.stationary) {
     factors.addPrior(V(link.id), gtsam::Vector3(gtsam::Z_3x1), Isotropic::Sigma(3, config.stationary_velocity));
   }

@@ -36,6 +36,7 @@ struct KeyframeLink {
   NavState guess;                ///< where the variables start; fields named odom are in map
   Pose T_previous_this;          ///< by odometry
   WhiteningRows odometry{0, 6};  ///< of it, by scan matching; may have no rows
+  std::optional<SightedSpeed> sighted;
   std::optional<ImuSum> imu;     ///< nothing: loose odometry, velocity and bias links take its place
 };
 

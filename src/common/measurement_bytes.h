@@ -40,12 +40,21 @@ void transfer(auto& io, FieldsOf<ImuSample> auto& sample) {
   io.number(sample.saturated);
 }
 
+void transfer(auto& io, FieldsOf<SightedSpeed> auto& sighted) {
+  io.matrix(sighted.axis);
+  io.number(sighted.speed);
+  io.number(sighted.variance);
+  io.matrix(sighted.position_step);
+  io.matrix(sighted.velocity_step);
+}
+
 void transfer(auto& io, FieldsOf<Keyframe> auto& keyframe) {
   io.number(keyframe.id);
   io.number(keyframe.session);
   transfer(io, keyframe.state);
   io.matrix(keyframe.covariance);
   io.matrix(keyframe.scan_information);
+  io.maybe(keyframe.sighted);
   io.number(keyframe.previous_utime);
   io.number(keyframe.stationary);
   io.number(keyframe.imu_complete);

@@ -144,7 +144,15 @@ void Lio::heed_sighted_walls(const FilterState& predicted, const MatchResult& ma
     FilterState cautious{filter_.nominal, cautious_};
     take_from_velocity(cautious, *error);
     cautious_ = cautious.covariance;
+    const NavState before = filter_.nominal;
     take_from_velocity(filter_, *error);
+    keyframer_.add_sighted(
+        {.axis = error->direction,
+         .speed = error->direction.dot(before.v_odom) - error->along,
+         .variance = error->variance,
+         .position_step = filter_.nominal.T_odom_body.translation - before.T_odom_body.translation,
+         .velocity_step = filter_.nominal.v_odom - before.v_odom},
+        {filter_.nominal, cautious_});
     sighted_walls_.clear();
     return;
   }

@@ -22,6 +22,10 @@ double heading_change(const NavState& from, const NavState& to) {
   return std::abs(std::remainder(change, 2.0 * std::numbers::pi));
 }
 
+double velocity_variance(const FilterState& filter, const Eigen::Vector3d& axis) {
+  return axis.dot(filter.covariance.block<3, 3>(kVelocity, kVelocity) * axis);
+}
+
 }  // namespace
 
 Keyframer::Keyframer(const FrontendConfig& config, std::int32_t session)
@@ -42,6 +46,16 @@ void Keyframer::add_imu(const ImuSample& sample) {
 
 void Keyframer::add_standstill(const Standstill& standstill) {
   if (next_id_ > 0) information_.add_standstill(standstill);
+}
+
+void Keyframer::add_sighted(const SightedSpeed& sighted, const FilterState& corrected) {
+  if (next_id_ == 0) return;
+  Taken taken{sighted, corrected.nominal.v_odom, velocity_variance(corrected, sighted.axis)};
+  if (taken_) {
+    taken.sighted.position_step += taken_->sighted.position_step;
+    taken.sighted.velocity_step += taken_->sighted.velocity_step;
+  }
+  taken_ = taken;
 }
 
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
@@ -98,6 +112,19 @@ std::vector<CloudPoint> Keyframer::merged_cloud(const Pose& T_odom_body) const {
   return voxel_downsample(merged, config_.voxel_size_m);
 }
 
+/// What was told, since which the vehicle has gained speed and the filter has become less sure of it.
+std::optional<SightedSpeed> Keyframer::sighted_now(const FilterState& filter) const {
+  if (!taken_) return std::nullopt;
+  const Eigen::Quaterniond R_body_odom = filter.nominal.T_odom_body.rotation.conjugate();
+  const SightedSpeed& then = taken_->sighted;
+  const double doubt = velocity_variance(filter, then.axis) - taken_->velocity_variance;
+  return SightedSpeed{.axis = R_body_odom * then.axis,
+                      .speed = then.speed + then.axis.dot(filter.nominal.v_odom - taken_->v_odom),
+                      .variance = then.variance + std::max(doubt, 0.0),
+                      .position_step = R_body_odom * then.position_step,
+                      .velocity_step = R_body_odom * then.velocity_step};
+}
+
 Keyframe Keyframer::make(const FilterState& filter) {
   const NavState& state = filter.nominal;
   Keyframe keyframe;
@@ -109,6 +136,7 @@ Keyframe Keyframer::make(const FilterState& filter) {
   keyframe.previous_utime = next_id_ == 0 ? state.utime : last_.utime;
   if (next_id_ > 0) {
     keyframe.scan_information = information_.information();
+    keyframe.sighted = sighted_now(filter);
     keyframe.stationary = stood_still(state);
     keyframe.imu_complete = imu_complete_;
   }
@@ -118,6 +146,7 @@ Keyframe Keyframer::make(const FilterState& filter) {
   last_ = state;
   information_.begin(filter);
   imu_complete_ = true;
+  taken_.reset();
   scans_ = 0;
   speed2_sum_ = 0.0;
   max_displacement_ = 0.0;

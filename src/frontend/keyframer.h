@@ -28,6 +28,10 @@ class Keyframer {
   /// The filter has taken that the vehicle stood, at the scan that comes next.
   void add_standstill(const Standstill& standstill);
 
+  /// The filter has taken a speed that a wall in sight told (odom axes), at the scan that comes next, and is `corrected`.
+  /// Of several in an interval the newest is handed on.
+  void add_sighted(const SightedSpeed& sighted, const FilterState& corrected);
+
   /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied; shifts along
   /// the unit axes `blind` (odom) it does not observe. `cloud` is in the body frame at that state. A keyframe that is
   /// due waits while the pose is not `confirmed`.
@@ -42,9 +46,16 @@ class Keyframer {
     std::vector<CloudPoint> cloud;  ///< body frame
   };
 
+  struct Taken {
+    SightedSpeed sighted;  ///< odom axes; steps are of all in the interval
+    Eigen::Vector3d v_odom = Eigen::Vector3d::Zero();
+    double velocity_variance = 0.0;  ///< [m^2/s^2] of the filter along the axis
+  };
+
   void note_motion(const NavState& state);
   [[nodiscard]] bool due(const NavState& state) const;
   [[nodiscard]] bool stood_still(const NavState& state) const;
+  [[nodiscard]] std::optional<SightedSpeed> sighted_now(const FilterState& filter) const;
   [[nodiscard]] std::vector<CloudPoint> merged_cloud(const Pose& T_odom_body) const;
   [[nodiscard]] Keyframe make(const FilterState& filter);
 
@@ -56,6 +67,7 @@ class Keyframer {
   std::vector<ImuSample> imu_;
   bool imu_complete_ = true;
   IntervalInformation information_;
+  std::optional<Taken> taken_;     ///< in the interval
   int scans_ = 0;                  ///< in the interval
   double speed2_sum_ = 0.0;        ///< [m^2/s^2] over the scans of the interval
   double max_displacement_ = 0.0;  ///< [m] from the last keyframe
@@ -66,6 +78,12 @@ class Keyframer {
     io.list(scan.cloud);
   }
 
+  friend void transfer(auto& io, FieldsOf<Taken> auto& taken) {
+    transfer(io, taken.sighted);
+    io.matrix(taken.v_odom);
+    io.number(taken.velocity_variance);
+  }
+
   friend void transfer(auto& io, FieldsOf<Keyframer> auto& keyframer) {
     io.number(keyframer.session_);
     io.number(keyframer.next_id_);
@@ -74,6 +92,7 @@ class Keyframer {
     io.list(keyframer.imu_);
     io.number(keyframer.imu_complete_);
     transfer(io, keyframer.information_);
+    io.maybe(keyframer.taken_);
     io.number(keyframer.scans_);
     io.number(keyframer.speed2_sum_);
     io.number(keyframer.max_displacement_);

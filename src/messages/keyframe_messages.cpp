@@ -21,6 +21,27 @@ std::int64_t parts_for(std::size_t items, std::int64_t per_part) {
   return (static_cast<std::int64_t>(items) + per_part - 1) / per_part;
 }
 
+void store_sighted(const std::optional<SightedSpeed>& sighted, keyframe_t& message) {
+  const SightedSpeed nothing{.axis = Eigen::Vector3d::Zero()};
+  const SightedSpeed& told = sighted ? *sighted : nothing;
+  store(told.axis, message.sighted_axis);
+  message.sighted_speed = told.speed;
+  message.sighted_sigma = std::sqrt(told.variance);
+  store(told.position_step, message.sighted_position_step);
+  store(told.velocity_step, message.sighted_velocity_step);
+}
+
+std::optional<SightedSpeed> load_sighted(const keyframe_t& message) {
+  SightedSpeed told;
+  told.axis = load(message.sighted_axis);
+  if (told.axis.isZero(0.0)) return std::nullopt;
+  told.speed = message.sighted_speed;
+  told.variance = message.sighted_sigma * message.sighted_sigma;
+  told.position_step = load(message.sighted_position_step);
+  told.velocity_step = load(message.sighted_velocity_step);
+  return told;
+}
+
 keyframe_t plain_fields(const Keyframe& keyframe) {
   keyframe_t message;
   message.utime = keyframe.state.utime;
@@ -44,6 +65,7 @@ keyframe_t plain_fields(const Keyframe& keyframe) {
       message.scan_information[6 * row + column] = keyframe.scan_information(row, column);
     }
   }
+  store_sighted(keyframe.sighted, message);
   message.num_imu = 0;
   message.num_points = 0;
   message.resolution = resolution_for(keyframe.cloud);
@@ -173,6 +195,7 @@ std::optional<Keyframe> KeyframeAssembler::add(const keyframe_t& part) {
       keyframe.scan_information(row, column) = first.scan_information[6 * row + column];
     }
   }
+  keyframe.sighted = load_sighted(first);
   keyframe.previous_utime = first.previous_utime;
   keyframe.stationary = first.stationary != 0;
   keyframe.imu_complete = first.imu_complete != 0;

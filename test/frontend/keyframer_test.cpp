@@ -131,6 +131,43 @@ TEST(Keyframer, InformationIsThatOfItsIntervalAlone) {
   EXPECT_EQ(uninformed->scan_information.norm(), 0.0);
 }
 
+/// As a filter that has just taken `sighted` at (0, 0, -1) and drives on by 1 m/s.
+FilterState corrected_by(const SightedSpeed& sighted, double velocity_variance, Utime now) {
+  FilterState filter;
+  filter.nominal.utime = now;
+  filter.nominal.T_odom_body = {frames::from_yaw_pitch_roll({0.5, 0.0, 0.0}), {0.0, 0.0, -1.0}};
+  filter.nominal.v_odom = sighted.speed * sighted.axis;
+  filter.covariance.block<3, 3>(kVelocity, kVelocity) = velocity_variance * Eigen::Matrix3d::Identity();
+  return filter;
+}
+
+TEST(Keyframer, HandsOnTheNewestSpeedThatAWallToldInAxesOfTheKeyframe) {
+  Stepper stepper;
+  (void)stepper.step({0, 0, 0});
+  const SightedSpeed early{.axis = {0, 0, 1}, .speed = -0.9, .variance = 0.01, .position_step = {0, 0, 0.2},
+                           .velocity_step = {0, 0, 0.4}};
+  const SightedSpeed late{.axis = {0, 0, 1}, .speed = -1.0, .variance = 0.0025, .position_step = {0, 0, 0.1},
+                          .velocity_step = {0, 0, -0.1}};
+  stepper.keyframer.add_sighted(early, corrected_by(early, 0.002, stepper.now));
+  FilterState filter = corrected_by(late, 0.001, stepper.now);
+  stepper.keyframer.add_sighted(late, filter);
+  filter.nominal.utime += 50'000;
+  filter.nominal.T_odom_body.translation.z() = -5.0;
+  filter.nominal.v_odom.z() += 0.25;  // it has braked meanwhile
+  filter.covariance.block<3, 3>(kVelocity, kVelocity) = 0.004 * Eigen::Matrix3d::Identity();
+  const auto keyframe = stepper.keyframer.add_scan(filter, Matrix6d::Zero(), {}, {});
+  ASSERT_TRUE(keyframe && keyframe->sighted);
+  const Eigen::Quaterniond R_odom_body = filter.nominal.T_odom_body.rotation;
+  EXPECT_LT((R_odom_body * keyframe->sighted->axis - late.axis).norm(), 1e-12);
+  EXPECT_NEAR(keyframe->sighted->speed, -0.75, 1e-12);
+  EXPECT_NEAR(keyframe->sighted->variance, 0.0025 + 0.003, 1e-12);
+  EXPECT_LT((R_odom_body * keyframe->sighted->position_step - Eigen::Vector3d(0, 0, 0.3)).norm(), 1e-12);
+  EXPECT_LT((R_odom_body * keyframe->sighted->velocity_step - Eigen::Vector3d(0, 0, 0.3)).norm(), 1e-12);
+  const auto next = stepper.step({0, 0, -10});
+  ASSERT_TRUE(next);
+  EXPECT_FALSE(next->sighted) << "of an earlier interval";
+}
+
 TEST(Keyframer, CloudHoldsTheLastSecondInTheKeyframesBodyFrame) {
   Stepper stepper;
   (void)stepper.step({0, 0, 0});

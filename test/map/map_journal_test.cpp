@@ -128,6 +128,31 @@ TEST(Fault_L1, WhatTheMapsJournalCouldNotWriteIsWrittenOnceTheDiskTakesIt) {
   EXPECT_EQ(journal.damage(), "");
 }
 
+TEST(Fault_L1, WhatWaitsForTheDiskIsWrittenInPiecesAndTheRestAtTheEnd) {
+  constexpr std::size_t kPoints = 200'000;  // two of these are more than one append writes
+  const std::filesystem::path folder = test::fresh_folder();
+  const auto size = [&] { return std::filesystem::file_size(folder / "map_keyframe_0"); };
+  std::size_t after_one = 0;
+  {
+    MapJournal journal(folder);
+    journal.begin({.config_fingerprint = kConfig});
+    {
+      const FullDisk disk(2000);
+      for (int i = 0; i < 6; ++i) journal.append(record(0, i == 0, kPoints));
+    }
+    journal.append(record(0, false, 10));
+    after_one = size();
+    EXPECT_GT(after_one, 4U << 20U);
+    EXPECT_LT(after_one, 8U << 20U);
+    EXPECT_NE(journal.failure(), "") << "most of it waits still";
+  }
+  EXPECT_GT(size(), 2 * after_one);
+  MapJournal journal(folder);
+  const auto loaded = journal.load(kConfig);
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->records.size(), 7U);
+}
+
 TEST(MapJournal, TellsALostRecordUntilItBeginsAnewThoughLaterOnesFit) {
   constexpr std::size_t kPoints = 2'000'000;  // three of these are more than waits in memory
   const std::filesystem::path folder = test::fresh_folder();

@@ -72,7 +72,7 @@ def test_journal_of_another_version_is_named_and_kept(private_network, tmp_path:
     (tmp_path / "journal").mkdir()
     file = tmp_path / "journal" / JOURNAL
     file.write_bytes(struct.pack("<II", len(payload), zlib.crc32(payload)) + payload)
-    first_words(tmp_path, CONFIG, "it has version 2, this build writes 8", f"{JOURNAL}.old1")
+    first_words(tmp_path, CONFIG, "it has version 2, this build writes 9", f"{JOURNAL}.old1")
     assert (tmp_path / "journal" / f"{JOURNAL}.old1").exists() and not file.exists()
 
 
