@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPrefix = "map_keyframe_";
 constexpr std::size_t kMostWaiting = 64U << 20U;  // [bytes] for a disk that takes none: half an hour of driving
-// [bytes] written by one append: a second of a card that takes 4 MB/s, so that a disk which works again does not keep the
-// map from saying that it lives.
+// [bytes] written by one append: a second of a card that takes 4 MB/s, so that a disk which works again does not keep
+// the map from saying that it lives.
 constexpr std::size_t kMostAtOnce = 4U << 20U;
 
 std::vector<fs::path> files_of(const fs::path& folder) {

@@ -101,15 +101,6 @@ NavState placed(NavState state, const Pose& T_map_odom) {
   return state;
 }
 
-/// Where the filter would be, had it not corrected itself by what walls in sight told. The graph is told the same.
-NavState as_moved(const Keyframe& keyframe) {
-  NavState state = keyframe.state;
-  if (!keyframe.sighted) return state;
-  state.T_odom_body.translation -= state.T_odom_body.rotation * keyframe.sighted->position_step;
-  state.v_odom -= state.T_odom_body.rotation * keyframe.sighted->velocity_step;
-  return state;
-}
-
 /// Shifts that the interval's scans leave open, in body axes of its start.
 Eigen::Matrix3d open_between(const Pose& T_previous_this, const Matrix6d& scan_information) {
   const Eigen::Matrix3d R = T_previous_this.rotation.toRotationMatrix();
@@ -135,8 +126,7 @@ KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool u
   link.previous_id = previous.id;
   link.stationary = keyframe.stationary;
   link.interval_s = seconds_between(previous.filter.utime, keyframe.state.utime);
-  const NavState moved = as_moved(keyframe);
-  link.T_previous_this = previous.filter.T_odom_body.inverse() * moved.T_odom_body;
+  link.T_previous_this = previous.filter.T_odom_body.inverse() * keyframe.state.T_odom_body;
   link.odometry = odometry;
   link.sighted = keyframe.sighted;
   const Pose T_map_odom = previous.estimate.T_odom_body * previous.filter.T_odom_body.inverse();
@@ -147,7 +137,7 @@ KeyframeLink next_link(const Keyframe& keyframe, const LinkEnd& previous, bool u
     const ImuSum sum = plain_sum(
         preintegrate(keyframe.imu, previous.filter.utime, keyframe.state.utime, previous.estimate, config.imu));
     link.imu = agreeing_along(open_between(link.T_previous_this, keyframe.scan_information),
-                              placed(previous.filter, T_map_odom), placed(moved, T_map_odom),
+                              placed(previous.filter, T_map_odom), placed(keyframe.state, T_map_odom),
                               config.imu.gravity, sum);
   }
   return link;

@@ -37,7 +37,7 @@ struct KeyframeLink {
   Pose T_previous_this;          ///< by odometry
   WhiteningRows odometry{0, 6};  ///< of it, by scan matching; may have no rows
   std::optional<SightedSpeed> sighted;
-  std::optional<ImuSum> imu;     ///< nothing: loose odometry, velocity and bias links take its place
+  std::optional<ImuSum> imu;  ///< nothing: loose odometry, velocity and bias links take its place
 };
 
 /// First keyframe: map equals odom there. Tilt is left uncertain about the two horizontal axes.

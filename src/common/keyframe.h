@@ -10,14 +10,11 @@
 
 namespace ignis {
 
-/// A speed that the front end has measured by a wall which is in no map, along a direction that scans do not observe. The
-/// filter has corrected itself by it: that much of the way between two keyframes is no motion.
+/// A speed that the front end has measured by a wall which is in no map, along a direction that scans do not observe.
 struct SightedSpeed {
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();          ///< unit
-  double speed = 0.0;                                       ///< [m/s] of the body along it
-  double variance = 0.0;                                    ///< [m^2/s^2]
-  Eigen::Vector3d position_step = Eigen::Vector3d::Zero();  ///< [m] of the filter's corrections
-  Eigen::Vector3d velocity_step = Eigen::Vector3d::Zero();  ///< [m/s]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< unit
+  double speed = 0.0;                               ///< [m/s] of the body along it
+  double variance = 0.0;                            ///< [m^2/s^2]
 };
 
 /// What the front end hands to the back end and the map every few metres.
@@ -31,11 +28,11 @@ struct Keyframe {
   /// was applied and the vehicle did not stand.
   Matrix6d scan_information = Matrix6d::Zero();
   std::optional<SightedSpeed> sighted;  ///< at the keyframe's instant, in its body axes
-  Utime previous_utime = 0;       ///< [us] instant of the previous keyframe; equals state.utime for the first
-  bool stationary = false;        ///< stood still during the whole interval
-  bool imu_complete = true;       ///< false when the interval has an IMU gap
-  std::vector<ImuSample> imu;     ///< all samples with previous_utime <= utime < state.utime
-  std::vector<CloudPoint> cloud;  ///< body frame of the keyframe, downsampled, about one second of scans
+  Utime previous_utime = 0;             ///< [us] instant of the previous keyframe; equals state.utime for the first
+  bool stationary = false;              ///< stood still during the whole interval
+  bool imu_complete = true;             ///< false when the interval has an IMU gap
+  std::vector<ImuSample> imu;           ///< all samples with previous_utime <= utime < state.utime
+  std::vector<CloudPoint> cloud;        ///< body frame of the keyframe, downsampled, about one second of scans
 };
 
 }  // namespace ignis

@@ -44,8 +44,6 @@ void transfer(auto& io, FieldsOf<SightedSpeed> auto& sighted) {
   io.matrix(sighted.axis);
   io.number(sighted.speed);
   io.number(sighted.variance);
-  io.matrix(sighted.position_step);
-  io.matrix(sighted.velocity_step);
 }
 
 void transfer(auto& io, FieldsOf<Keyframe> auto& keyframe) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frontend/kalman_step.h"
 #include "frontend/lio.h"
 #include "frontend/scan_instant.h"
 #include "frontend/voxel_downsample.h"
@@ -15,17 +16,11 @@ constexpr double kVagueSpeed = 0.1;    // m/s: known better, a wall ahead enters
 constexpr double kUnevenStep = 0.03;   // m: of the position, beyond what the velocity explains
 constexpr double kUnevenSpeed = 0.03;  // m/s
 
-/// Kalman update with a measured error of the velocity.
 void take_from_velocity(FilterState& filter, const VelocityError& error) {
-  using Row = Eigen::Matrix<double, 1, kErrorSize>;
-  Row H = Row::Zero();
-  H.segment<3>(kVelocity) = error.direction.transpose();
-  const ErrorCovariance& P = filter.covariance;
-  const ErrorVector K = P * H.transpose() / ((H * P * H.transpose())(0) + error.variance);
-  const ErrorCovariance kept = ErrorCovariance::Identity() - K * H;
-  filter.covariance = kept * P * kept.transpose() + error.variance * K * K.transpose();
-  filter.covariance = (0.5 * (filter.covariance + filter.covariance.transpose())).eval();
-  filter.nominal = perturbed(filter.nominal, (-error.along * K).eval());
+  Eigen::Matrix<double, 1, kErrorSize> derivative = Eigen::Matrix<double, 1, kErrorSize>::Zero();
+  derivative.segment<3>(kVelocity) = error.direction.transpose();
+  kalman_step<1>(filter, Eigen::Matrix<double, 1, 1>(error.along), derivative,
+                 Eigen::Matrix<double, 1, 1>(error.variance));
 }
 
 /// Beside what the scan does not observe.
@@ -144,15 +139,10 @@ void Lio::heed_sighted_walls(const FilterState& predicted, const MatchResult& ma
     FilterState cautious{filter_.nominal, cautious_};
     take_from_velocity(cautious, *error);
     cautious_ = cautious.covariance;
-    const NavState before = filter_.nominal;
+    const double speed = error->direction.dot(filter_.nominal.v_odom) - error->along;
     take_from_velocity(filter_, *error);
-    keyframer_.add_sighted(
-        {.axis = error->direction,
-         .speed = error->direction.dot(before.v_odom) - error->along,
-         .variance = error->variance,
-         .position_step = filter_.nominal.T_odom_body.translation - before.T_odom_body.translation,
-         .velocity_step = filter_.nominal.v_odom - before.v_odom},
-        {filter_.nominal, cautious_});
+    keyframer_.add_sighted({.axis = error->direction, .speed = speed, .variance = error->variance},
+                           {filter_.nominal, cautious_});
     sighted_walls_.clear();
     return;
   }

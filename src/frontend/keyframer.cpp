@@ -50,12 +50,7 @@ void Keyframer::add_standstill(const Standstill& standstill) {
 
 void Keyframer::add_sighted(const SightedSpeed& sighted, const FilterState& corrected) {
   if (next_id_ == 0) return;
-  Taken taken{sighted, corrected.nominal.v_odom, velocity_variance(corrected, sighted.axis)};
-  if (taken_) {
-    taken.sighted.position_step += taken_->sighted.position_step;
-    taken.sighted.velocity_step += taken_->sighted.velocity_step;
-  }
-  taken_ = taken;
+  taken_ = {sighted, corrected.nominal.v_odom, velocity_variance(corrected, sighted.axis)};
 }
 
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
@@ -120,9 +115,7 @@ std::optional<SightedSpeed> Keyframer::sighted_now(const FilterState& filter) co
   const double doubt = velocity_variance(filter, then.axis) - taken_->velocity_variance;
   return SightedSpeed{.axis = R_body_odom * then.axis,
                       .speed = then.speed + then.axis.dot(filter.nominal.v_odom - taken_->v_odom),
-                      .variance = then.variance + std::max(doubt, 0.0),
-                      .position_step = R_body_odom * then.position_step,
-                      .velocity_step = R_body_odom * then.velocity_step};
+                      .variance = then.variance + std::max(doubt, 0.0)};
 }
 
 Keyframe Keyframer::make(const FilterState& filter) {

@@ -28,8 +28,8 @@ class Keyframer {
   /// The filter has taken that the vehicle stood, at the scan that comes next.
   void add_standstill(const Standstill& standstill);
 
-  /// The filter has taken a speed that a wall in sight told (odom axes), at the scan that comes next, and is `corrected`.
-  /// Of several in an interval the newest is handed on.
+  /// The filter has taken a speed that a wall in sight told (odom axes), at the scan that comes next, and is
+  /// `corrected`. Of several in an interval the newest is handed on.
   void add_sighted(const SightedSpeed& sighted, const FilterState& corrected);
 
   /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied; shifts along
@@ -47,7 +47,7 @@ class Keyframer {
   };
 
   struct Taken {
-    SightedSpeed sighted;  ///< odom axes; steps are of all in the interval
+    SightedSpeed sighted;  ///< odom axes
     Eigen::Vector3d v_odom = Eigen::Vector3d::Zero();
     double velocity_variance = 0.0;  ///< [m^2/s^2] of the filter along the axis
   };

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
-
 #include "common/so3.h"
+#include "frontend/kalman_step.h"
 
 namespace ignis {
 namespace {
@@ -144,15 +143,7 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
 }
 
 void correct_to_standstill(FilterState& filter, const Standstill& standstill) {
-  const ErrorCovariance& P = filter.covariance;
-  const Eigen::Matrix<double, 6, kErrorSize>& H = standstill.derivative;
-  const Matrix6d R = standstill.variance.asDiagonal();
-  const Eigen::Matrix<double, kErrorSize, 6> K = P * H.transpose() * (H * P * H.transpose() + R).inverse();
-  const ErrorCovariance kept = ErrorCovariance::Identity() - K * H;
-  const ErrorVector step = -K * standstill.estimate;
-  filter.covariance = kept * P * kept.transpose() + K * R * K.transpose();
-  filter.covariance = (0.5 * (filter.covariance + filter.covariance.transpose())).eval();
-  filter.nominal = perturbed(filter.nominal, step);
+  kalman_step<6>(filter, standstill.estimate, standstill.derivative, standstill.variance);
 }
 
 }  // namespace ignis

@@ -46,8 +46,7 @@ enum class Unless : std::int8_t {
                                                         Unless unless = Unless::kItMayRoll);
 
 /// Kalman update with the measurement "velocity and turn rate = 0" (zero-velocity update; I. Skog et al.,
-/// "Zero-velocity detection - an algorithm evaluation", IEEE TBME 57(11), 2010). Joseph form: the covariance stays
-/// positive.
+/// "Zero-velocity detection - an algorithm evaluation", IEEE TBME 57(11), 2010).
 void correct_to_standstill(FilterState& filter, const Standstill& standstill);
 
 }  // namespace ignis

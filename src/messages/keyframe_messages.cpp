@@ -27,8 +27,6 @@ void store_sighted(const std::optional<SightedSpeed>& sighted, keyframe_t& messa
   store(told.axis, message.sighted_axis);
   message.sighted_speed = told.speed;
   message.sighted_sigma = std::sqrt(told.variance);
-  store(told.position_step, message.sighted_position_step);
-  store(told.velocity_step, message.sighted_velocity_step);
 }
 
 std::optional<SightedSpeed> load_sighted(const keyframe_t& message) {
@@ -37,8 +35,6 @@ std::optional<SightedSpeed> load_sighted(const keyframe_t& message) {
   if (told.axis.isZero(0.0)) return std::nullopt;
   told.speed = message.sighted_speed;
   told.variance = message.sighted_sigma * message.sighted_sigma;
-  told.position_step = load(message.sighted_position_step);
-  told.velocity_step = load(message.sighted_velocity_step);
   return told;
 }
 

@@ -59,7 +59,7 @@ inline constexpr LayoutStep kState[] = {
 inline constexpr LayoutStep kScanStats[] = {
     {kFixed, 8 + 3 * 4 + 2}, {kString}, {kFixed, 3 * 4 + 5 * 8 + 3 * 8 + 1 + 8 + 2 + 8 + 7 * 8 + 4 + 8}};
 inline constexpr LayoutStep kCloud[] = {{kFixed, 8 + 4 + 2 + 2 + 4 + 1 + 7 * 8}, {kCount}, {kArray, 4 * 4}};
-inline constexpr LayoutStep kKeyframe[] = {{kFixed, 8 + 3 * 4 + 2 + 2 + 8 + 2 + (3 + 4 + 3 + 3 + 3 + 225 + 36 + 11) * 8},
+inline constexpr LayoutStep kKeyframe[] = {{kFixed, 8 + 3 * 4 + 2 + 2 + 8 + 2 + (3 + 4 + 3 + 3 + 3 + 225 + 36 + 5) * 8},
                                            {kCount},
                                            {kArray, 7 * 4},
                                            {kCount},

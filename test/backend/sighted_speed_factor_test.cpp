@@ -78,23 +78,5 @@ TEST(SightedSpeed, TakesBackWhatTheWayBeforeItHasDrifted) {
   EXPECT_LT(told, 0.5 * untold) << untold;
 }
 
-TEST(SightedSpeed, WhatTheFilterHasCorrectedIsNoMotion) {
-  testing::Drive drive = blind_drive();
-  constexpr std::size_t kWhen = 12;
-  drive.keyframes.resize(kWhen + 1);
-  drive.keyframes[kWhen].sighted = SightedSpeed{.axis = {0, 0, -1}, .speed = kForwardSpeed, .variance = 1e-3};
-  const std::vector<Pose> continuous = smoothed(drive.keyframes);
-  SightedSpeed& sighted = *drive.keyframes[kWhen].sighted;
-  sighted.position_step = {0.1, 0.0, 0.7};
-  sighted.velocity_step = {0.0, 0.1, -0.4};
-  const Eigen::Quaterniond R = drive.keyframes[kWhen].state.T_odom_body.rotation;
-  drive.keyframes[kWhen].state.T_odom_body.translation += R * sighted.position_step;
-  drive.keyframes[kWhen].state.v_odom += R * sighted.velocity_step;
-  const std::vector<Pose> jumped = smoothed(drive.keyframes);
-  for (std::size_t i = 0; i < jumped.size(); ++i) {
-    EXPECT_LT((jumped[i].translation - continuous[i].translation).norm(), 1e-3) << i;
-  }
-}
-
 }  // namespace
 }  // namespace ignis
