@@ -67,11 +67,12 @@ std::optional<PoseGraphSolution> solve_incrementally(const PoseGraph& graph, con
   }
   const Stopwatch settling;
   PoseGraphSolution solution = optimiser.finish();
-  std::cout << cost_line(
-                   "incremental", graph, solution,
-                   std::format("{:.2f} s; per update p50 {:.2f} ms, p99 {:.2f} ms, max {:.1f} ms; settling {:.2f} s",
-                               times.total() + settling.seconds(), 1e3 * times.quantile(0.5),
-                               1e3 * times.quantile(0.99), 1e3 * times.quantile(1.0), settling.seconds()))
+  std::cout << cost_line("incremental", graph, solution,
+                         std::format(
+                             "{:.2f} s; per update p50 {:.2f} ms, p99 {:.2f} ms, max {:.1f} ms; settling {:.2f} s; "
+                             "lowest from {}",
+                             times.total() + settling.seconds(), 1e3 * times.quantile(0.5), 1e3 * times.quantile(0.99),
+                             1e3 * times.quantile(1.0), settling.seconds(), words_of(solution.start)))
             << std::flush;
   return solution;
 }

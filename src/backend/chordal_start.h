@@ -13,4 +13,9 @@ namespace ignis {
 /// it is. In the order of the graph's vertices; empty when the edges do not determine all.
 [[nodiscard]] std::vector<KeyframePose> chordal_start(const PoseGraph& graph);
 
+/// The graph's poses with these attitudes, turned together so that the first vertex stays where it is, and the
+/// positions that suit them best. Empty when the edges do not determine all, or without attitudes.
+[[nodiscard]] std::vector<KeyframePose> with_positions(const PoseGraph& graph,
+                                                       const std::vector<Eigen::Matrix3d>& attitudes);
+
 }  // namespace ignis

@@ -14,6 +14,7 @@
 #include <unordered_map>
 
 #include "backend/chordal_start.h"
+#include "backend/lifted_start.h"
 
 namespace ignis {
 namespace {
@@ -45,6 +46,14 @@ bool descend(gtsam::NonlinearFactorGraph factors, const gtsam::NonlinearFactor::
   return is_wanted;
 }
 
+/// Batch steps for a while.
+PoseGraphSolution settled(const PoseGraph& graph, PoseGraphStart start) {
+  PoseGraphSolution solution =
+      optimise_in_batch(graph, [](std::size_t iteration, double) { return iteration < kFinalBatchSteps; });
+  solution.start = start;
+  return solution;
+}
+
 std::string unreachable(const PoseGraph& graph, const std::vector<bool>& reached) {
   std::string names;
   std::size_t count = 0;
@@ -57,6 +66,20 @@ std::string unreachable(const PoseGraph& graph, const std::vector<bool>& reached
 }
 
 }  // namespace
+
+std::string_view words_of(PoseGraphStart start) {
+  switch (start) {
+    case PoseGraphStart::kStoredPoses:
+      return "the stored poses";
+    case PoseGraphStart::kPoseByPose:
+      return "pose by pose";
+    case PoseGraphStart::kChordalRelaxation:
+      return "the chordal relaxation";
+    case PoseGraphStart::kLiftedDescent:
+      return "the lifted descent";
+  }
+  return "";
+}
 
 std::vector<PoseGraphOptimiser::Entry> PoseGraphOptimiser::entry_order(const PoseGraph& graph) {
   if (graph.vertices.empty()) throw std::runtime_error("the graph has no vertex");
@@ -129,17 +152,20 @@ Pose PoseGraphOptimiser::pose(std::int32_t id) {
 PoseGraphSolution PoseGraphOptimiser::finish() {
   assert(complete());
   solver_.settle(kFinalSteps * relinearize_skip_);
-  const auto for_a_while = [](std::size_t iteration, double) { return iteration < kFinalBatchSteps; };
   PoseGraph start = graph_;
   for (KeyframePose& vertex : start.vertices) vertex.T_map_body = pose(vertex.id);
   // Linearisation points may still lie within the solver's thresholds of where they should be.
-  PoseGraphSolution incremental = optimise_in_batch(start, for_a_while);
+  const PoseGraphSolution incremental = settled(start, PoseGraphStart::kPoseByPose);
   start.vertices = chordal_start(graph_);
   if (start.vertices.empty()) return incremental;
-  PoseGraphSolution relaxed = optimise_in_batch(start, for_a_while);
-  if (relaxed.half_chi_square >= incremental.half_chi_square * (1.0 - kSameMinimum)) return incremental;
-  relaxed.is_relaxed = true;
-  return relaxed;
+  const PoseGraphSolution relaxed = settled(start, PoseGraphStart::kChordalRelaxation);
+  const PoseGraphSolution& lower = relaxed.half_chi_square < incremental.half_chi_square ? relaxed : incremental;
+  const PoseGraphSolution& higher = &lower == &relaxed ? incremental : relaxed;
+  if (lower.half_chi_square >= higher.half_chi_square * (1.0 - kSameMinimum)) return incremental;
+  start.vertices = lifted_start(graph_, start.vertices);
+  if (start.vertices.empty()) return lower;
+  PoseGraphSolution lifted = settled(start, PoseGraphStart::kLiftedDescent);
+  return lifted.half_chi_square < lower.half_chi_square * (1.0 - kSameMinimum) ? lifted : lower;
 }
 
 PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config) {

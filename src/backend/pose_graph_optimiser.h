@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -12,10 +14,15 @@
 
 namespace ignis {
 
+/// What a solution was reached from.
+enum class PoseGraphStart : std::uint8_t { kStoredPoses, kPoseByPose, kChordalRelaxation, kLiftedDescent };
+
+[[nodiscard]] std::string_view words_of(PoseGraphStart start);
+
 struct PoseGraphSolution {
   std::vector<KeyframePose> poses;  ///< in the order of the graph's vertices
   double half_chi_square = 0.0;     ///< of the edges alone
-  bool is_relaxed = false;          ///< reached from the chordal relaxation, not from where the solver stood
+  PoseGraphStart start = PoseGraphStart::kStoredPoses;
 };
 
 /// Solves a graph of relative poses incrementally, as the back end does on the vehicle: a pose enters when an edge
@@ -36,7 +43,8 @@ class PoseGraphOptimiser {
 
   /// Settles the whole graph: updates without news, then batch steps from where they end, as the back end swaps in its
   /// batch optimum. Where edges err by a tenth of a radian and more, pose by pose may have led into a wrong minimum;
-  /// so batch steps from the chordal relaxation are tried as well, and the lower cost stands. Requires complete().
+  /// so batch steps from the chordal relaxation are tried as well, and where these end elsewhere, others from the
+  /// lifted descent. The lowest cost stands. Requires complete().
   [[nodiscard]] PoseGraphSolution finish();
 
  private:

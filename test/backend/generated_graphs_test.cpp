@@ -168,13 +168,16 @@ TEST_P(GeneratedGraph, EndsWithinOnePerMilleOfTheOptimumThatBatchFindsFromTheTru
   EXPECT_GT(found, 0.999 * optimum);
 }
 
-// Headings that err by 0.25 rad between few loops lead into a wrong minimum pose by pose, at twice the optimum.
-TEST(PoseGraphOptimiser, TakesTheRelaxationWherePoseByPoseLedAstray) {
+// Headings that err by 0.25 rad between few loops lead into a wrong minimum pose by pose, at twice the optimum, and
+// into another one from the chordal relaxation. Batch LM from the truth itself need not find the best.
+TEST(PoseGraphOptimiser, LeavesTheWrongMinimaOfVagueHeadingsByTheLiftedDescent) {
   const PoseGraph graph = measured({"", manhattan_of_few_loops, 0.1, 0.25, true}, 3);
   const double optimum = optimise_in_batch(graph, [](std::size_t, double) { return true; }).half_chi_square;
   const PoseGraphSolution solution = optimise_pose_graph(without_poses(graph), config_for_files());
-  EXPECT_TRUE(solution.is_relaxed);
-  EXPECT_LT(solution.half_chi_square, 1.6 * optimum);
+  RecordProperty("from_the_truth", std::to_string(optimum));
+  RecordProperty("half_chi_square", std::to_string(solution.half_chi_square));
+  EXPECT_EQ(solution.start, PoseGraphStart::kLiftedDescent) << words_of(solution.start);
+  EXPECT_LT(solution.half_chi_square, 1.001 * optimum);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeded, GeneratedGraph,

@@ -35,6 +35,7 @@ def test_both_solutions_are_printed_and_the_graph_is_written(run_binary, tmp_pat
     incremental, batch = cost(done.stdout, "incremental"), cost(again.stdout, "batch LM")
     assert incremental == pytest.approx(batch, rel=1e-3)
     assert "p50" in done.stdout and "p99" in done.stdout
+    assert "lowest from pose by pose" in done.stdout
 
 
 @pytest.mark.parametrize(
