@@ -17,23 +17,29 @@ constexpr double kOutOfThePlane = 0.3;      // sigma of what is added to the row
 constexpr int kDescents = 200;              // steps at most before pressure grows
 constexpr int kConjugate = 100;             // directions at most that one step is made of
 constexpr double kConjugateDecrease = 0.1;  // of the gradient's norm, then the step is good enough
-constexpr double kFlat = 1e-5;              // relative decrease of the cost that counts for nothing
 constexpr int kFlatSteps = 3;               // so many of those in a row end the descent
 constexpr double kLeastGradient = 1e-12;    // squared, of the cost
 constexpr double kLeastRadius = 1e-9;       // of the first one
 constexpr double kFirstPressure = 1e-4;     // of the mean attitude's weight
-constexpr double kLastPressure = 0.1;
-constexpr double kMorePressure = 3.16;
+constexpr double kLastPressure = 0.11;
 constexpr double kPressedOut = 1e-6;  // mean square of what is left in the columns under pressure
 
-/// Steihaug's truncated conjugate gradients within a trust region, and what they promise.
+/// In space a step costs ten times as much as in the plane.
+struct Patience {
+  double flat = 0.0;           ///< relative decrease of the cost that counts for nothing
+  double more_pressure = 0.0;  ///< times as much as before
+};
+constexpr Patience kInThePlane{1e-5, 3.16};
+constexpr Patience kInSpace{1e-4, 10.0};
+
+/// Steps by truncated conjugate gradients within a trust region (T. Steihaug, SIAM J. Numer. Anal. 20(3), 1983).
 template <class Scalar>
 class TrustedDescent {
  public:
   using Problem = LiftedProblem<Scalar>;
   using Matrix = typename Problem::Matrix;
 
-  explicit TrustedDescent(const Problem& problem) : problem_(problem) {}
+  TrustedDescent(const Problem& problem, double flat) : problem_(problem), flat_(flat) {}
 
   /// As low as it goes from `point`.
   Matrix run(Matrix point) {
@@ -58,7 +64,7 @@ class TrustedDescent {
       if (kept_promise > 0.75 && step.at_edge) radius *= 2.0;
       if (radius < least_radius) break;
       if (!(kept_promise > 0.05)) continue;
-      flat = cost - next_cost < kFlat * cost ? flat + 1 : 0;
+      flat = cost - next_cost < flat_ * cost ? flat + 1 : 0;
       cost = next_cost;
       point = std::move(next);
     }
@@ -111,6 +117,7 @@ class TrustedDescent {
   }
 
   const Problem& problem_;
+  double flat_;
 };
 
 void set_attitude(const Eigen::Matrix3d& R, Eigen::Ref<Eigen::MatrixXd> rows) { rows.leftCols<3>() = R.transpose(); }
@@ -182,13 +189,15 @@ std::vector<Eigen::Matrix3d> descended(const PoseGraph& graph, const std::vector
   using Problem = LiftedProblem<Scalar>;
   Problem problem(graph);
   if (!problem.determined()) return {};
-  TrustedDescent<Scalar> descent(problem);
+  constexpr Patience kPatience = Problem::kPlanar ? kInThePlane : kInSpace;
+  TrustedDescent<Scalar> descent(problem, kPatience.flat);
   auto point = turned(problem, descent.run(first_point(problem, start)));
   const auto left = [&] {
     const auto rows = static_cast<double>(problem.poses());
     return point.bottomRows(Problem::kRows * problem.poses()).rightCols(kMoreColumns).squaredNorm() / rows;
   };
-  for (double share = kFirstPressure; share <= kLastPressure && left() > kPressedOut; share *= kMorePressure) {
+  for (double share = kFirstPressure; share <= kLastPressure && left() > kPressedOut;
+       share *= kPatience.more_pressure) {
     problem.press(share);
     point = descent.run(std::move(point));
   }

@@ -155,17 +155,18 @@ PoseGraphSolution PoseGraphOptimiser::finish() {
   PoseGraph start = graph_;
   for (KeyframePose& vertex : start.vertices) vertex.T_map_body = pose(vertex.id);
   // Linearisation points may still lie within the solver's thresholds of where they should be.
-  const PoseGraphSolution incremental = settled(start, PoseGraphStart::kPoseByPose);
+  PoseGraphSolution best = settled(start, PoseGraphStart::kPoseByPose);
   start.vertices = chordal_start(graph_);
-  if (start.vertices.empty()) return incremental;
-  const PoseGraphSolution relaxed = settled(start, PoseGraphStart::kChordalRelaxation);
-  const PoseGraphSolution& lower = relaxed.half_chi_square < incremental.half_chi_square ? relaxed : incremental;
-  const PoseGraphSolution& higher = &lower == &relaxed ? incremental : relaxed;
-  if (lower.half_chi_square >= higher.half_chi_square * (1.0 - kSameMinimum)) return incremental;
+  if (start.vertices.empty()) return best;
+  PoseGraphSolution relaxed = settled(start, PoseGraphStart::kChordalRelaxation);
+  const auto [lower, higher] = std::minmax({best.half_chi_square, relaxed.half_chi_square});
+  if (lower >= higher * (1.0 - kSameMinimum)) return best;
+  if (relaxed.half_chi_square < best.half_chi_square) best = std::move(relaxed);
   start.vertices = lifted_start(graph_, start.vertices);
-  if (start.vertices.empty()) return lower;
+  if (start.vertices.empty()) return best;
   PoseGraphSolution lifted = settled(start, PoseGraphStart::kLiftedDescent);
-  return lifted.half_chi_square < lower.half_chi_square * (1.0 - kSameMinimum) ? lifted : lower;
+  if (lifted.half_chi_square < best.half_chi_square * (1.0 - kSameMinimum)) best = std::move(lifted);
+  return best;
 }
 
 PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config) {
