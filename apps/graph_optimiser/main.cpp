@@ -66,13 +66,17 @@ std::optional<PoseGraphSolution> solve_incrementally(const PoseGraph& graph, con
     }
   }
   const Stopwatch settling;
-  PoseGraphSolution solution = optimiser.finish();
-  std::cout << cost_line("incremental", graph, solution,
-                         std::format(
-                             "{:.2f} s; per update p50 {:.2f} ms, p99 {:.2f} ms, max {:.1f} ms; settling {:.2f} s; "
-                             "lowest from {}",
-                             times.total() + settling.seconds(), 1e3 * times.quantile(0.5), 1e3 * times.quantile(0.99),
-                             1e3 * times.quantile(1.0), settling.seconds(), words_of(solution.start)))
+  const PoseGraphSolution solution = optimiser.finish([&](PoseGraphStart start) {
+    progress.show(std::format("settling from {}, {:.0f} s", words_of(start), settling.seconds()));
+    return !runtime::stop_requested();
+  });
+  std::cout << cost_line(
+                   "incremental", graph, solution,
+                   std::format("{:.2f} s; per update p50 {:.2f} ms, p99 {:.2f} ms, max {:.1f} ms; settling {:.2f} s; "
+                               "lowest from {}{}",
+                               times.total() + settling.seconds(), 1e3 * times.quantile(0.5),
+                               1e3 * times.quantile(0.99), 1e3 * times.quantile(1.0), settling.seconds(),
+                               words_of(solution.start), runtime::stop_requested() ? ", interrupted" : ""))
             << std::flush;
   return solution;
 }
@@ -119,7 +123,7 @@ int main(int argc, char** argv) {
       argc, argv,
       [&](CLI::App& app) {
         app.add_option("graph", options.input, "g2o text: VERTEX_SE3:QUAT and EDGE_SE3:QUAT, or the SE2 records");
-        app.add_option("-o,--out", options.output, "file for the graph with the incremental solution");
+        app.add_option("-o,--out", options.output, "file for the graph with the solution of lowest cost");
         app.add_flag("--no-batch", options.no_batch, "leave out the batch solve");
         app.add_option("--relinearize-position", options.solver.relinearize_position_m,
                        "shift that asks for a new linearisation [m]")

@@ -7,6 +7,7 @@
 #include <format>
 #include <ios>
 #include <iterator>
+#include <new>
 #include <utility>
 
 #include <fcntl.h>
@@ -26,6 +27,7 @@ constexpr std::size_t kMostWaiting = 64U << 20U;  // [bytes] for a disk that tak
 // [bytes] written by one append: a second of a card that takes 4 MB/s, so that a disk which works again does not keep
 // the map from saying that it lives.
 constexpr std::size_t kMostAtOnce = 4U << 20U;
+constexpr std::size_t kMostAtTheEnd = 16U << 20U;  // [bytes] a quarter of the time that systemd gives
 
 std::vector<fs::path> files_of(const fs::path& folder) {
   std::vector<fs::path> paths;
@@ -46,7 +48,11 @@ void remove_file(const fs::path& path) {
 MapJournal::MapJournal(fs::path folder) : folder_(std::move(folder), "map_builder", "journal") {}
 
 MapJournal::~MapJournal() {
-  write_waiting(kMostWaiting);
+  try {
+    write_waiting(kMostAtTheEnd);
+  } catch (const std::bad_alloc&) {
+    // What waited is lost, as it would be without a last attempt.
+  }
   close_file();
 }
 

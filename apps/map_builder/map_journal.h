@@ -22,8 +22,8 @@ namespace ignis {
 /// A record is handed to the kernel at once, so a killed process loses none; it is not synced, since after a power cut
 /// the drive is over. With a keyframe that the map has dropped its file goes, so the folder is bounded as the map is:
 /// 16 bytes a point. What cannot be written shows in failure(), waits in memory up to a bound and is tried again with
-/// the next records, a few megabytes with each, and at the end; the map goes on. The records of a keyframe whose own is
-/// lost help nobody: restore() leaves them out.
+/// the next records, a few megabytes with each, and some at the end; the map goes on. The records of a keyframe whose
+/// own is lost help nobody: restore() leaves them out.
 class MapJournal {
  public:
   struct Loaded {

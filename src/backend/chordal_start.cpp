@@ -62,7 +62,7 @@ class LinkedSystem {
 
 std::vector<KeyframePose> with_positions(const PoseGraph& graph, const std::vector<Eigen::Matrix3d>& attitudes) {
   std::vector<KeyframePose> poses = graph.vertices;
-  if (attitudes.size() != poses.size()) return {};
+  if (poses.empty() || attitudes.size() != poses.size()) return {};
   const Eigen::Matrix3d R_map_common = poses.front().T_map_body.rotation * attitudes.front().transpose();
   LinkedSystem<1> positions(std::ssize(poses), poses.front().T_map_body.translation.transpose());
   for (const PoseGraphLink& link : links_of(graph)) {

@@ -12,7 +12,7 @@ constexpr double kSymmetryTolerance = 1e-6;   // relative to the largest entry
 constexpr double kAbsurdPosition = 1e6;       // [m]
 constexpr double kAbsurdSpeed = 500.0;        // [m/s]
 constexpr double kLeapFreedom = 10.0;         // [m] whatever the interval: a correction of the front end
-constexpr double kLeastSpeedVariance = 1e-8;  // [m^2/s^2]
+constexpr double kLeastSpeedVariance = 1e-4;  // [m^2/s^2]
 constexpr double kAbsurdBias = 100.0;         // [rad/s] or [m/s^2]
 constexpr double kAbsurdVariance = 1e12;      // in units of the state: beyond it the chain's sums mean nothing
 

@@ -50,8 +50,7 @@ class LiftedProblem {
   /// The change of the gradient with a step along the manifold.
   [[nodiscard]] Matrix curvature(const Matrix& point, const Slope& slope, const Matrix& step) const;
 
-  /// The step that would undo a gradient if attitudes were free, along the manifold; and the norm of steps that goes
-  /// with it is that of the matrix.
+  /// About the step that would undo a gradient if attitudes were free, along the manifold.
   [[nodiscard]] Matrix free_step(const Matrix& point, const Matrix& gradient) const;
 
   [[nodiscard]] auto attitude(Matrix& point, Eigen::Index pose) const {

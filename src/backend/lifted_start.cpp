@@ -17,7 +17,7 @@ constexpr double kOutOfThePlane = 0.3;      // sigma of what is added to the row
 constexpr int kDescents = 200;              // steps at most before pressure grows
 constexpr int kConjugate = 100;             // directions at most that one step is made of
 constexpr double kConjugateDecrease = 0.1;  // of the gradient's norm, then the step is good enough
-constexpr int kFlatSteps = 3;               // so many of those in a row end the descent
+constexpr int kFlatSteps = 3;               // in a row, of no decrease that counts, end the descent
 constexpr double kLeastGradient = 1e-12;    // squared, of the cost
 constexpr double kLeastRadius = 1e-9;       // of the first one
 constexpr double kFirstPressure = 1e-4;     // of the mean attitude's weight
@@ -39,28 +39,30 @@ class TrustedDescent {
   using Problem = LiftedProblem<Scalar>;
   using Matrix = typename Problem::Matrix;
 
-  TrustedDescent(const Problem& problem, double flat) : problem_(problem), flat_(flat) {}
+  TrustedDescent(const Problem& problem, double flat, const std::function<bool()>& goes_on)
+      : problem_(problem), flat_(flat), goes_on_(goes_on) {}
 
-  /// As low as it goes from `point`.
+  /// As low as it goes from `point`, or until it may not go on.
   Matrix run(Matrix point) {
     double cost = problem_.cost(point);
     double radius = 0.0;
     double least_radius = 0.0;
     int flat = 0;
-    for (int i = 0; i < kDescents && flat < kFlatSteps; ++i) {
+    for (int i = 0; i < kDescents && flat < kFlatSteps && goes_on_(); ++i) {
       const typename Problem::Slope slope = problem_.slope(point);
       const Matrix free_step = problem_.free_step(point, slope.gradient);
       const double square = Problem::dot(slope.gradient, free_step);
-      if (square <= kLeastGradient * cost) break;
+      if (!(square > kLeastGradient * std::abs(cost))) break;
       if (radius == 0.0) {
         radius = 0.25 * std::sqrt(square);
         least_radius = kLeastRadius * radius;
       }
       const Step step = step_within(radius, point, slope, free_step);
+      if (!(step.promise > 0.0)) break;
       Matrix next = problem_.point(point + step.step);
       const double next_cost = problem_.cost(next);
       const double kept_promise = (cost - next_cost) / step.promise;
-      if (kept_promise < 0.25) radius *= 0.25;
+      if (!(kept_promise >= 0.25)) radius *= 0.25;
       if (kept_promise > 0.75 && step.at_edge) radius *= 2.0;
       if (radius < least_radius) break;
       if (!(kept_promise > 0.05)) continue;
@@ -88,7 +90,7 @@ class TrustedDescent {
     double step_step = 0.0;  // in the norm of the problem's matrix, as the other two
     double step_direction = 0.0;
     double direction_direction = square;
-    for (int i = 0; i < kConjugate && square > enough; ++i) {
+    for (int i = 0; i < kConjugate && square > enough && goes_on_(); ++i) {
       const Matrix bent = problem_.curvature(point, slope, direction);
       const double curvature = Problem::dot(direction, bent);
       const double length = square / curvature;
@@ -118,6 +120,7 @@ class TrustedDescent {
 
   const Problem& problem_;
   double flat_;
+  const std::function<bool()>& goes_on_;
 };
 
 void set_attitude(const Eigen::Matrix3d& R, Eigen::Ref<Eigen::MatrixXd> rows) { rows.leftCols<3>() = R.transpose(); }
@@ -185,12 +188,13 @@ std::vector<Eigen::Matrix3d> attitudes_of(const LiftedProblem<Scalar>& problem,
 }
 
 template <class Scalar>
-std::vector<Eigen::Matrix3d> descended(const PoseGraph& graph, const std::vector<KeyframePose>& start) {
+std::vector<Eigen::Matrix3d> descended(const PoseGraph& graph, const std::vector<KeyframePose>& start,
+                                       const std::function<bool()>& goes_on) {
   using Problem = LiftedProblem<Scalar>;
   Problem problem(graph);
   if (!problem.determined()) return {};
   constexpr Patience kPatience = Problem::kPlanar ? kInThePlane : kInSpace;
-  TrustedDescent<Scalar> descent(problem, kPatience.flat);
+  TrustedDescent<Scalar> descent(problem, kPatience.flat, goes_on);
   auto point = turned(problem, descent.run(first_point(problem, start)));
   const auto left = [&] {
     const auto rows = static_cast<double>(problem.poses());
@@ -201,15 +205,17 @@ std::vector<Eigen::Matrix3d> descended(const PoseGraph& graph, const std::vector
     problem.press(share);
     point = descent.run(std::move(point));
   }
+  if (!goes_on()) return {};
   return attitudes_of(problem, point);
 }
 
 }  // namespace
 
-std::vector<KeyframePose> lifted_start(const PoseGraph& graph, const std::vector<KeyframePose>& start) {
+std::vector<KeyframePose> lifted_start(const PoseGraph& graph, const std::vector<KeyframePose>& start,
+                                       const std::function<bool()>& goes_on) {
   if (graph.vertices.size() < 2) return graph.vertices;
-  return with_positions(graph,
-                        graph.planar ? descended<std::complex<double>>(graph, start) : descended<double>(graph, start));
+  return with_positions(graph, graph.planar ? descended<std::complex<double>>(graph, start, goes_on)
+                                            : descended<double>(graph, start, goes_on));
 }
 
 }  // namespace ignis

@@ -22,6 +22,7 @@ namespace {
 constexpr int kFinalSteps = 3;                // Gauss-Newton steps over the whole graph once everything is in
 constexpr std::size_t kFinalBatchSteps = 50;  // at most, from there
 constexpr double kSameMinimum = 1e-6;         // relative difference of two costs that is none
+constexpr double kRoundingPerEdge = 1e-9;     // of half chi-square
 constexpr std::size_t kNamedVertices = 5;     // of those that hang in the air
 constexpr std::size_t kBatchIterations = 100;
 constexpr double kBatchRelativeDecrease = 1e-9;
@@ -47,11 +48,17 @@ bool descend(gtsam::NonlinearFactorGraph factors, const gtsam::NonlinearFactor::
 }
 
 /// Batch steps for a while.
-PoseGraphSolution settled(const PoseGraph& graph, PoseGraphStart start) {
-  PoseGraphSolution solution =
-      optimise_in_batch(graph, [](std::size_t iteration, double) { return iteration < kFinalBatchSteps; });
+PoseGraphSolution settled(const PoseGraph& graph, PoseGraphStart start, const SettlingObserver& observer) {
+  PoseGraphSolution solution = optimise_in_batch(
+      graph, [&](std::size_t iteration, double) { return observer(start) && iteration < kFinalBatchSteps; });
   solution.start = start;
   return solution;
+}
+
+/// By more than rounding makes of it: relative, and absolute where edges are met exactly.
+bool is_lower(const PoseGraphSolution& a, const PoseGraphSolution& b, std::size_t edges) {
+  const double rounding = kSameMinimum * b.half_chi_square + kRoundingPerEdge * static_cast<double>(edges);
+  return a.half_chi_square < b.half_chi_square - rounding;
 }
 
 std::string unreachable(const PoseGraph& graph, const std::vector<bool>& reached) {
@@ -149,30 +156,31 @@ Pose PoseGraphOptimiser::pose(std::int32_t id) {
   return variables_.pose_in(solver_.estimate_of(std::span(&key, 1)), id);
 }
 
-PoseGraphSolution PoseGraphOptimiser::finish() {
+PoseGraphSolution PoseGraphOptimiser::finish(const SettlingObserver& observer) {
   assert(complete());
   solver_.settle(kFinalSteps * relinearize_skip_);
   PoseGraph start = graph_;
   for (KeyframePose& vertex : start.vertices) vertex.T_map_body = pose(vertex.id);
   // Linearisation points may still lie within the solver's thresholds of where they should be.
-  PoseGraphSolution best = settled(start, PoseGraphStart::kPoseByPose);
+  PoseGraphSolution best = settled(start, PoseGraphStart::kPoseByPose, observer);
   start.vertices = chordal_start(graph_);
+  if (start.vertices.empty() || !observer(PoseGraphStart::kChordalRelaxation)) return best;
+  PoseGraphSolution relaxed = settled(start, PoseGraphStart::kChordalRelaxation, observer);
+  const std::size_t edges = graph_.edges.size();
+  if (!is_lower(best, relaxed, edges) && !is_lower(relaxed, best, edges)) return best;
+  if (is_lower(relaxed, best, edges)) best = std::move(relaxed);
+  const auto goes_on = [&] { return observer(PoseGraphStart::kLiftedDescent); };
+  start.vertices = lifted_start(graph_, start.vertices, goes_on);
   if (start.vertices.empty()) return best;
-  PoseGraphSolution relaxed = settled(start, PoseGraphStart::kChordalRelaxation);
-  const auto [lower, higher] = std::minmax({best.half_chi_square, relaxed.half_chi_square});
-  if (lower >= higher * (1.0 - kSameMinimum)) return best;
-  if (relaxed.half_chi_square < best.half_chi_square) best = std::move(relaxed);
-  start.vertices = lifted_start(graph_, start.vertices);
-  if (start.vertices.empty()) return best;
-  PoseGraphSolution lifted = settled(start, PoseGraphStart::kLiftedDescent);
-  if (lifted.half_chi_square < best.half_chi_square * (1.0 - kSameMinimum)) best = std::move(lifted);
+  PoseGraphSolution lifted = settled(start, PoseGraphStart::kLiftedDescent, observer);
+  if (is_lower(lifted, best, edges)) best = std::move(lifted);
   return best;
 }
 
 PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config) {
   PoseGraphOptimiser optimiser(graph, config);
   while (!optimiser.complete()) optimiser.add_next();
-  return optimiser.finish();
+  return optimiser.finish([](PoseGraphStart) { return true; });
 }
 
 PoseGraphSolution optimise_in_batch(const PoseGraph& graph, const BatchObserver& observer) {

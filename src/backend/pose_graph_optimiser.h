@@ -25,6 +25,9 @@ struct PoseGraphSolution {
   PoseGraphStart start = PoseGraphStart::kStoredPoses;
 };
 
+/// Told again and again which start is being worked from; false ends the work there, and the lowest cost so far stands.
+using SettlingObserver = std::function<bool(PoseGraphStart start)>;
+
 /// Solves a graph of relative poses incrementally, as the back end does on the vehicle: a pose enters when an edge
 /// connects it to those that are in (of several, the one that comes first in the file), with all its edges to them,
 /// first guessed through the edge to the most recent one. The stored vertex poses are not used except for the first,
@@ -45,7 +48,7 @@ class PoseGraphOptimiser {
   /// batch optimum. Where edges err by a tenth of a radian and more, pose by pose may have led into a wrong minimum;
   /// so batch steps from the chordal relaxation are tried as well, and where these end elsewhere, others from the
   /// lifted descent. The lowest cost stands. Requires complete().
-  [[nodiscard]] PoseGraphSolution finish();
+  [[nodiscard]] PoseGraphSolution finish(const SettlingObserver& observer);
 
  private:
   /// A vertex and its edges to those that enter before it.

@@ -51,6 +51,7 @@ void Lio::heed_second_opinion(const FilterState& predicted, const MatchResult& m
   alone.covariance.block<3, 3>(kAccelBias, kAccelBias) += untaught * untaught.transpose();
   filter_ = alone;
   cautious_ = alone.covariance;
+  keyframer_.forget_sighted();
   matcher_.distrust_weak_shifts();
   opinion_.forget();
   trust_.note_contradiction();

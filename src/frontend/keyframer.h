@@ -32,6 +32,9 @@ class Keyframer {
   /// `corrected`. Of several in an interval the newest is handed on.
   void add_sighted(const SightedSpeed& sighted, const FilterState& corrected);
 
+  /// The filter was replaced by one that has not taken it.
+  void forget_sighted() { taken_.reset(); }
+
   /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied; shifts along
   /// the unit axes `blind` (odom) it does not observe. `cloud` is in the body frame at that state. A keyframe that is
   /// due waits while the pose is not `confirmed`.

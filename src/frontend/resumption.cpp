@@ -92,6 +92,7 @@ void Lio::seek_confirmation(ScanReason reason) {
   contradictions_ = 0;
   filter_ = *unaided_;
   cautious_ = unaided_->covariance;
+  keyframer_.forget_sighted();
   last_correction_.reset();
   trust_.note_resumption();
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 
 #include "common/compact_cloud.h"
@@ -34,7 +35,8 @@ std::optional<SightedSpeed> load_sighted(const keyframe_t& message) {
   told.axis = load(message.sighted_axis);
   if (told.axis.isZero(0.0)) return std::nullopt;
   told.speed = message.sighted_speed;
-  told.variance = message.sighted_sigma * message.sighted_sigma;
+  const double sigma = message.sighted_sigma;
+  told.variance = sigma > 0.0 ? sigma * sigma : std::numeric_limits<double>::quiet_NaN();
   return told;
 }
 

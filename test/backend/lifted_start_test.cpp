@@ -43,6 +43,8 @@ PoseGraph exact_graph(bool planar) {
   return graph;
 }
 
+bool always() { return true; }
+
 class LiftedStart : public ::testing::TestWithParam<bool> {};
 
 TEST_P(LiftedStart, FindsTheTruthOfExactEdgesFromAnywhere) {
@@ -50,7 +52,7 @@ TEST_P(LiftedStart, FindsTheTruthOfExactEdgesFromAnywhere) {
   std::mt19937 random(8);
   std::vector<KeyframePose> anywhere;
   for (int i = 0; i < kPoses; ++i) anywhere.push_back({i, random_pose(random, GetParam())});
-  const std::vector<KeyframePose> found = lifted_start(graph, anywhere);
+  const std::vector<KeyframePose> found = lifted_start(graph, anywhere, always);
   ASSERT_EQ(found.size(), graph.vertices.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_LT(body_difference(graph.vertices[i].T_map_body, found[i].T_map_body).norm(), 1e-3) << i;
@@ -63,7 +65,17 @@ TEST_P(LiftedStart, IsEmptyWhereNothingIsSaidOfAnAttitude) {
   Matrix6d information = Matrix6d::Zero();
   information.bottomRightCorner<3, 3>().setIdentity();
   graph.edges.push_back({0, kPoses, Pose(), information, false});
-  EXPECT_TRUE(lifted_start(graph, graph.vertices).empty());
+  EXPECT_TRUE(lifted_start(graph, graph.vertices, always).empty());
+}
+
+TEST_P(LiftedStart, EndsAtOnceWhenItMayNotGoOn) {
+  const PoseGraph graph = exact_graph(GetParam());
+  std::mt19937 random(8);
+  std::vector<KeyframePose> anywhere;
+  for (int i = 0; i < kPoses; ++i) anywhere.push_back({i, random_pose(random, GetParam())});
+  int asked = 0;
+  EXPECT_TRUE(lifted_start(graph, anywhere, [&] { return ++asked < 10; }).empty());
+  EXPECT_LT(asked, 40);
 }
 
 INSTANTIATE_TEST_SUITE_P(Either, LiftedStart, ::testing::Bool(),
@@ -110,19 +122,37 @@ TYPED_TEST(LiftedProblemOf, GradientAndCurvatureAreThoseOfTheCost) {
   EXPECT_NEAR(Problem::dot(step, this->problem_.curvature(point, slope, step)), second, 1e-3 * std::abs(second));
 }
 
-TYPED_TEST(LiftedProblemOf, CostOfTheTruthIsNothingWithoutPressure) {
-  using Problem = typename TestFixture::Problem;
-  const PoseGraph graph = exact_graph(Problem::kPlanar);
-  typename TestFixture::Matrix rows = TestFixture::Matrix::Zero(this->problem_.rows(), Problem::kRows + 2);
-  for (Eigen::Index i = 0; i < kPoses; ++i) {
+/// The graph's own poses, in as many columns as a test's random rows have.
+template <class Problem>
+typename Problem::Matrix attitudes_of_the_truth(const Problem& problem, const PoseGraph& graph) {
+  typename Problem::Matrix rows = Problem::Matrix::Zero(problem.rows(), Problem::kRows + 2);
+  for (Eigen::Index i = 0; i < problem.poses(); ++i) {
     const Eigen::Matrix3d R = graph.vertices[static_cast<std::size_t>(i)].T_map_body.rotation.toRotationMatrix();
     if constexpr (Problem::kPlanar) {
-      this->problem_.attitude(rows, i)(0, 0) = {R(0, 0), R(1, 0)};
+      problem.attitude(rows, i)(0, 0) = {R(0, 0), R(1, 0)};
     } else {
-      this->problem_.attitude(rows, i).template leftCols<3>() = R.transpose();
+      problem.attitude(rows, i).template leftCols<3>() = R.transpose();
     }
   }
-  EXPECT_NEAR(this->problem_.cost(this->problem_.point(rows)), 0.0, 1e-9);
+  return rows;
+}
+
+TYPED_TEST(LiftedProblemOf, TheTruthCostsNothingThoughThereIsPressure) {
+  const PoseGraph graph = exact_graph(TestFixture::Problem::kPlanar);
+  EXPECT_NEAR(this->problem_.cost(this->problem_.point(attitudes_of_the_truth(this->problem_, graph))), 0.0, 1e-9);
+}
+
+TYPED_TEST(LiftedProblemOf, ASmallTurnCostsHalfItsSquareTimesItsInformation) {
+  constexpr double kTurn = 1e-3;
+  PoseGraph graph = exact_graph(TestFixture::Problem::kPlanar);
+  // The newest pose hangs on one edge: its position gives way, its heading is what the edge judges.
+  graph.vertices.push_back({kPoses, graph.vertices.back().T_map_body});
+  graph.edges.push_back({kPoses - 1, kPoses, Pose(), 100.0 * Matrix6d::Identity(), false});
+  const typename TestFixture::Problem problem(graph);
+  auto& turned = graph.vertices.back().T_map_body.rotation;
+  turned = turned * so3::exp({0.0, 0.0, kTurn});
+  const double cost = problem.cost(problem.point(attitudes_of_the_truth(problem, graph)));
+  EXPECT_NEAR(cost, 0.5 * 100.0 * kTurn * kTurn, 1e-9);
 }
 
 }  // namespace

@@ -164,6 +164,17 @@ TEST(Keyframer, HandsOnTheNewestSpeedThatAWallToldInAxesOfTheKeyframe) {
   EXPECT_FALSE(next->sighted) << "of an earlier interval";
 }
 
+TEST(Keyframer, HandsOnNoSpeedOfAFilterThatWasReplaced) {
+  Stepper stepper;
+  (void)stepper.step({0, 0, 0});
+  const SightedSpeed sighted{.axis = {0, 0, 1}, .speed = -1.0, .variance = 0.0025};
+  stepper.keyframer.add_sighted(sighted, corrected_by(sighted, 0.001, stepper.now));
+  stepper.keyframer.forget_sighted();
+  const auto keyframe = stepper.step({0, 0, -5});
+  ASSERT_TRUE(keyframe);
+  EXPECT_FALSE(keyframe->sighted);
+}
+
 TEST(Keyframer, CloudHoldsTheLastSecondInTheKeyframesBodyFrame) {
   Stepper stepper;
   (void)stepper.step({0, 0, 0});

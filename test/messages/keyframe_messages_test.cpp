@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <random>
 #include <set>
@@ -73,6 +74,15 @@ TEST(KeyframeMessages, TellThatNothingWasSighted) {
   const std::optional<Keyframe> back = assembler.add(to_messages(keyframe).front());
   ASSERT_TRUE(back);
   EXPECT_FALSE(back->sighted);
+}
+
+TEST(KeyframeMessages, TakeNoSigmaThatIsNoneForOne) {
+  keyframe_t message = to_messages(keyframe_of(1, 1, 1.0F)).front();
+  message.sighted_sigma = -0.05;
+  KeyframeAssembler assembler;
+  const std::optional<Keyframe> back = assembler.add(message);
+  ASSERT_TRUE(back && back->sighted);
+  EXPECT_TRUE(std::isnan(back->sighted->variance)) << "so that whoever takes it can refuse it by name";
 }
 
 TEST(KeyframeMessages, CoarsenTheResolutionInsteadOfWrapping) {
