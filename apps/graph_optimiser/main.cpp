@@ -66,7 +66,7 @@ std::optional<PoseGraphSolution> solve_incrementally(const PoseGraph& graph, con
     }
   }
   const Stopwatch settling;
-  const PoseGraphSolution solution = optimiser.finish([&](PoseGraphStart start) {
+  PoseGraphSolution solution = optimiser.finish([&](PoseGraphStart start) {
     progress.show(std::format("settling from {}, {:.0f} s", words_of(start), settling.seconds()));
     return !runtime::stop_requested();
   });

@@ -51,7 +51,7 @@ MapJournal::~MapJournal() {
   try {
     write_waiting(kMostAtTheEnd);
   } catch (const std::bad_alloc&) {
-    // What waited is lost, as it would be without a last attempt.
+    waiting_.clear();  // lost, as they would be without a last attempt
   }
   close_file();
 }
