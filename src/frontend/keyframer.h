@@ -13,6 +13,19 @@
 
 namespace ignis {
 
+/// A speed that a wall in sight told, and what the filter was once it had taken it.
+struct TakenSpeed {
+  SightedSpeed sighted;                              ///< odom axes
+  Eigen::Vector3d v_odom = Eigen::Vector3d::Zero();  ///< [m/s]
+  double velocity_variance = 0.0;                    ///< [m^2/s^2] along the axis
+};
+
+void transfer(auto& io, FieldsOf<TakenSpeed> auto& taken) {
+  transfer(io, taken.sighted);
+  io.matrix(taken.v_odom);
+  io.number(taken.velocity_variance);
+}
+
 /// Decides when a keyframe is due (distance, turn, or time since the last one; the first scan always) and assembles it:
 /// the last second of deskewed scans as one cloud, the IMU samples and the scan-matching information of the interval.
 class Keyframer {
@@ -49,12 +62,6 @@ class Keyframer {
     std::vector<CloudPoint> cloud;  ///< body frame
   };
 
-  struct Taken {
-    SightedSpeed sighted;  ///< odom axes
-    Eigen::Vector3d v_odom = Eigen::Vector3d::Zero();
-    double velocity_variance = 0.0;  ///< [m^2/s^2] of the filter along the axis
-  };
-
   void note_motion(const NavState& state);
   [[nodiscard]] bool due(const NavState& state) const;
   [[nodiscard]] bool stood_still(const NavState& state) const;
@@ -70,21 +77,15 @@ class Keyframer {
   std::vector<ImuSample> imu_;
   bool imu_complete_ = true;
   IntervalInformation information_;
-  std::optional<Taken> taken_;     ///< in the interval
-  int scans_ = 0;                  ///< in the interval
-  double speed2_sum_ = 0.0;        ///< [m^2/s^2] over the scans of the interval
-  double max_displacement_ = 0.0;  ///< [m] from the last keyframe
+  std::optional<TakenSpeed> taken_;  ///< in the interval
+  int scans_ = 0;                    ///< in the interval
+  double speed2_sum_ = 0.0;          ///< [m^2/s^2] over the scans of the interval
+  double max_displacement_ = 0.0;    ///< [m] from the last keyframe
 
   friend void transfer(auto& io, FieldsOf<RegisteredScan> auto& scan) {
     io.number(scan.utime);
     transfer(io, scan.T_odom_body);
     io.list(scan.cloud);
-  }
-
-  friend void transfer(auto& io, FieldsOf<Taken> auto& taken) {
-    transfer(io, taken.sighted);
-    io.matrix(taken.v_odom);
-    io.number(taken.velocity_variance);
   }
 
   friend void transfer(auto& io, FieldsOf<Keyframer> auto& keyframer) {
