@@ -4,15 +4,16 @@
 Not part of the test run; called by hand:
 
     ./ignis shell python3 test/faults/soak.py --seconds 3600 --out results/soak
+    ./ignis shell python3 test/faults/soak.py --seconds 1800 --viewers 0 --browsers 3 --out results/soak
     ./ignis shell python3 test/faults/soak.py --seconds 3600 --speed 5 --out results/soak
     ./ignis shell python3 test/faults/soak.py --seconds 10800 --speed 6 --set backend.estimated_keyframes=1000 \\
         --out results/soak
 
 With --speed the sensor is a lap that is played again and again, without the driver; seconds are those of the sensor.
 
-Writes soak.csv, soak.json and soak.png. Exits with 1 when a keyframe was lost, a process died, or descriptors or
-threads grew. Memory and latency depend on what is simulated and on who else works: they are printed, by quarters and
-halves.
+Writes soak.csv, soak.json and soak.png. Exits with 1 when a keyframe was lost, a process died, descriptors or threads
+grew, or a browser's page was disconnected or fell over something. Memory and latency depend on what is simulated and on
+who else works: they are printed, by quarters and halves.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ import matplotlib
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-for folder in (HERE, HERE.parent / "system", HERE.parent / "map"):
+for folder in (HERE, HERE.parent / "system", HERE.parent / "map", HERE.parent / "web"):
     sys.path.insert(0, str(folder))
 
 from l1_endurance import long_scene  # noqa: E402
 from lap_player import LapPlayer, simulate_laps  # noqa: E402
+from soak_pages import WatchedPages  # noqa: E402
+from soak_pages import troubles as troubles_of_pages  # noqa: E402
 
 from fault_drive import BUS, CONFIG, PORT, SCENE  # noqa: E402
 from ignis.bus import Listener  # noqa: E402
@@ -131,7 +134,7 @@ def start_sensor(
 
 
 def drive(
-    folder: Path, seconds: float, viewers: int, speed: float, settings: list[str]
+    folder: Path, seconds: float, viewers: int, browsers: int, speed: float, settings: list[str]
 ) -> tuple[list[Sample], dict[str, Any]]:
     """One soak; returns the samples and what was counted."""
     samples: list[Sample] = []
@@ -146,25 +149,28 @@ def drive(
         common = ("--config", CONFIG, *(word for setting in settings for word in ("--set", setting)))
         pipeline.start("map_builder", *common, "--port", PORT)
         pipeline.wait_for_text("map_builder", "http://", 20.0)
-        pipeline.start("graph_backend", *common, "--journal", folder / "journal")
-        pipeline.start("lio_frontend", *common)
-        sensor = start_sensor(pipeline, folder, seconds, speed, common)
-        watching = [Viewer(ViewAddress(PORT)) for _ in range(viewers)]
-        while (passed := sensor.played_s) < seconds:
-            listener.listen(2.0)
-            pipeline.check()
-            for (name, pid), (_, health) in listener.health.items():
-                descriptors, threads = used_by(pid)
-                samples.append(
-                    Sample(
-                        round(passed, 1), name, health.memory_mb, health.latency_ms, health.cpu_percent,
-                        descriptors, threads, len(ids), health.state,
-                    )
-                )  # fmt: skip
-        sensor.end()
-        listener.listen(5.0)
-        newest = {name: listener.channels[name].newest for name in ("SMOOTHED_KEYFRAMES", "MAP_STATUS")}
-        journal = sum(file.stat().st_size for file in (folder / "journal").iterdir())
+        with WatchedPages(f"http://127.0.0.1:{PORT}/", browsers, folder) as pages:
+            pipeline.start("graph_backend", *common, "--journal", folder / "journal")
+            pipeline.start("lio_frontend", *common)
+            sensor = start_sensor(pipeline, folder, seconds, speed, common)
+            watching = [Viewer(ViewAddress(PORT)) for _ in range(viewers)]
+            while (passed := sensor.played_s) < seconds:
+                listener.listen(2.0)
+                pipeline.check()
+                pages.look(passed)
+                for (name, pid), (_, health) in listener.health.items():
+                    descriptors, threads = used_by(pid)
+                    samples.append(
+                        Sample(
+                            round(passed, 1), name, health.memory_mb, health.latency_ms, health.cpu_percent,
+                            descriptors, threads, len(ids), health.state,
+                        )
+                    )  # fmt: skip
+            sensor.end()
+            listener.listen(5.0)
+            browser_pages = pages.figures()
+            newest = {name: listener.channels[name].newest for name in ("SMOOTHED_KEYFRAMES", "MAP_STATUS")}
+            journal = sum(file.stat().st_size for file in (folder / "journal").iterdir())
         pipeline.stop("l1_driver", "l1_sim")
     lost = {
         f"{name} {channel}": count
@@ -189,12 +195,13 @@ def drive(
             }
             for each in watching
         ],
+        "pages": browser_pages,
     }
 
 
 def judged(samples: list[Sample], figures: dict[str, Any]) -> list[str]:
     """Adds the trends to the figures; what is wrong, in words."""
-    troubles = []
+    troubles = troubles_of_pages(figures["pages"])
     if figures["keyframes_in_graph"] < figures["keyframes"]:
         troubles.append("the graph lost keyframes")
     for name in PROCESSES:
@@ -253,6 +260,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=600.0, help="length of the drive (default 600)")
     parser.add_argument("--speed", type=float, default=1.0, help="of the sensor's time (default 1: through the driver)")
     parser.add_argument("--viewers", type=int, default=3, help="WebSocket clients (default 3)")
+    parser.add_argument("--browsers", type=int, default=0, help="headless browsers with the page open (default 0)")
     parser.add_argument("--set", action="append", default=[], metavar="section.key=value", help="for every process")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     options = parser.parse_args()
@@ -260,7 +268,9 @@ def main() -> int:
         parser.error(f"--seconds must be at least {2 * SETTLED_S:.0f}: the first {SETTLED_S:.0f} are left out")
     options.out.mkdir(parents=True, exist_ok=True)
     enter_private_network()
-    samples, figures = drive(options.out.resolve(), options.seconds, options.viewers, options.speed, options.set)
+    samples, figures = drive(
+        options.out.resolve(), options.seconds, options.viewers, options.browsers, options.speed, options.set
+    )
     troubles = judged(samples, figures)
     with open(options.out / "soak.csv", "w", newline="") as file:
         writer = csv.DictWriter(file, list(asdict(samples[0])))
