@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "backend/loop_distribution.h"
+#include "backend/loops/loop_distribution.h"
 
 namespace ignis::bench {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "backend/loop_result.h"
+#include "backend/loops/loop_result.h"
 #include "common/pose.h"
 
 namespace ignis::bench {

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "aligned_error.h"
-#include "backend/shadow_schedule.h"
+#include "backend/shadow/shadow_schedule.h"
 #include "frontend/lio.h"
 #include "graph_backend/lasting_graph.h"
 #include "lap_source.h"

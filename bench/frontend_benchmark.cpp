@@ -9,14 +9,14 @@
 
 #include <benchmark/benchmark.h>
 
-#include "frontend/deskew.h"
-#include "frontend/eskf.h"
-#include "frontend/four_planes.h"
-#include "frontend/neighbour_search.h"
-#include "frontend/plane_fit.h"
-#include "frontend/scan_matcher.h"
-#include "frontend/scan_update.h"
-#include "frontend/voxel_downsample.h"
+#include "frontend/filter/eskf.h"
+#include "frontend/local_map/neighbour_search.h"
+#include "frontend/local_map/voxel_downsample.h"
+#include "frontend/matching/deskew.h"
+#include "frontend/matching/scan_matcher.h"
+#include "frontend/matching/scan_update.h"
+#include "frontend/planes/four_planes.h"
+#include "frontend/planes/plane_fit.h"
 #include "recorded_drive.h"
 
 namespace ignis::bench {

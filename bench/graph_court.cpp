@@ -11,10 +11,10 @@
 #include <format>
 #include <stdexcept>
 
-#include "backend/gtsam_conversion.h"
-#include "backend/loop_admission.h"
-#include "backend/relative_pose_factor.h"
-#include "backend/revision_report.h"
+#include "backend/factors/gtsam_conversion.h"
+#include "backend/factors/relative_pose_factor.h"
+#include "backend/keyframes/revision_report.h"
+#include "backend/loops/loop_admission.h"
 
 namespace ignis::bench {
 namespace {

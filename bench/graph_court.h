@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "backend/backend_config.h"
-#include "backend/incremental_solver.h"
-#include "backend/pose_graph_file.h"
+#include "backend/pose_graph/pose_graph_file.h"
 #include "backend/smoother.h"
 #include "backend/smoother_state.h"
+#include "backend/solver/incremental_solver.h"
 
 namespace ignis::bench {
 

@@ -16,11 +16,11 @@
 #include <stdexcept>
 
 #include "aligned_error.h"
-#include "backend/gtsam_conversion.h"
-#include "backend/loop_consistency.h"
-#include "backend/odometry_chain.h"
-#include "backend/pose_graph_optimiser.h"
-#include "backend/relative_pose_factor.h"
+#include "backend/factors/gtsam_conversion.h"
+#include "backend/factors/relative_pose_factor.h"
+#include "backend/keyframes/odometry_chain.h"
+#include "backend/loops/loop_consistency.h"
+#include "backend/pose_graph/pose_graph_optimiser.h"
 #include "graph_court.h"
 #include "process_cost.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "backend/backend_config.h"
-#include "backend/pose_graph_file.h"
+#include "backend/pose_graph/pose_graph_file.h"
 #include "loop_liar.h"
 #include "study_drive.h"
 

@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "backend/odometry_chain.h"
+#include "backend/keyframes/odometry_chain.h"
 
 namespace ignis::bench {
 namespace {

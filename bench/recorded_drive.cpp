@@ -6,8 +6,8 @@
 #include "drivers/l1_decoder.h"
 #include "drivers/sim/l1_stream.h"
 #include "drivers/sim/spinning_stream.h"
-#include "frontend/deskew.h"
-#include "frontend/voxel_downsample.h"
+#include "frontend/local_map/voxel_downsample.h"
+#include "frontend/matching/deskew.h"
 #include "runtime/ignis_config.h"
 
 namespace ignis::bench {

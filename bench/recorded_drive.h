@@ -7,7 +7,7 @@
 #include "common/measurements.h"
 #include "common/nav_state.h"
 #include "frontend/frontend_config.h"
-#include "frontend/local_map.h"
+#include "frontend/local_map/local_map.h"
 
 /// What the micro-benchmarks of the front end work on: the first seconds of a simulated drive, and the moment of its
 /// last scan. Both frames, odom and world, are the same here, and the IMU is perfect, so that nothing but the code

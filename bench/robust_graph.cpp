@@ -10,10 +10,10 @@
 
 #include <stdexcept>
 
-#include "backend/gtsam_conversion.h"
-#include "backend/information.h"
-#include "backend/keyframe_factors.h"
-#include "backend/relative_pose_factor.h"
+#include "backend/factors/gtsam_conversion.h"
+#include "backend/factors/information.h"
+#include "backend/factors/keyframe_factors.h"
+#include "backend/factors/relative_pose_factor.h"
 
 namespace ignis::bench {
 namespace {

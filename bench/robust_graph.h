@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "backend/keyframe_factors.h"
+#include "backend/factors/keyframe_factors.h"
 #include "backend/smoother.h"
 
 namespace ignis::bench {

@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include "backend/graph_change.h"
-#include "backend/journal.h"
+#include "backend/journal/graph_change.h"
+#include "backend/journal/journal.h"
 
 namespace {
 

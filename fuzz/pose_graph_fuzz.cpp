@@ -9,7 +9,7 @@
 #include <string>
 #include <unordered_set>
 
-#include "backend/pose_graph_file.h"
+#include "backend/pose_graph/pose_graph_file.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <utility>
 
-#include "backend/keyframe_check.h"
+#include "backend/keyframes/keyframe_check.h"
 #include "backend_health.h"
 #include "command_check.h"
 #include "ignis/graph_command_t.hpp"

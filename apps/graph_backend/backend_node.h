@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "backend/shadow_schedule.h"
+#include "backend/shadow/shadow_schedule.h"
 #include "background_solve.h"
 #include "common/leap_guard.h"
 #include "keyframe_inbox.h"

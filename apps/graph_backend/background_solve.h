@@ -9,7 +9,7 @@
 #include <stop_token>
 #include <utility>
 
-#include "backend/shadow_optimum.h"
+#include "backend/shadow/shadow_optimum.h"
 
 namespace ignis {
 

@@ -12,8 +12,8 @@
 
 #include <boost/interprocess/mapped_region.hpp>
 
-#include "backend/journal.h"
-#include "backend/record_archive.h"
+#include "backend/journal/journal.h"
+#include "backend/journal/record_archive.h"
 #include "background_sync.h"
 #include "runtime/state_folder.h"
 

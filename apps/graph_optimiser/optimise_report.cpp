@@ -7,7 +7,7 @@
 #include <iostream>
 #include <numeric>
 
-#include "backend/pose_graph_cost.h"
+#include "backend/pose_graph/pose_graph_cost.h"
 
 namespace ignis {
 namespace {

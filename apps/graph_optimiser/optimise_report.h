@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "backend/pose_graph_file.h"
-#include "backend/pose_graph_optimiser.h"
+#include "backend/pose_graph/pose_graph_file.h"
+#include "backend/pose_graph/pose_graph_optimiser.h"
 
 namespace ignis {
 

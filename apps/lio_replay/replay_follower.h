@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "backend/corrected_trajectory.h"
-#include "backend/shadow_schedule.h"
+#include "backend/keyframes/corrected_trajectory.h"
+#include "backend/shadow/shadow_schedule.h"
 #include "backend/smoother.h"
 #include "frontend/lio.h"
 #include "graph_listener.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "backend/shadow_optimum.h"
+#include "backend/shadow/shadow_optimum.h"
 #include "backend/smoother.h"
 #include "common/trajectory_file.h"
 #include "frontend/lio.h"

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "backend/incremental_solver.h"
-#include "backend/loop_matcher.h"
-#include "backend/preintegration.h"
+#include "backend/factors/preintegration.h"
+#include "backend/loops/loop_matcher.h"
+#include "backend/solver/incremental_solver.h"
 #include "common/config_fields.h"
 
 namespace ignis {

@@ -3,17 +3,17 @@
 
 #include <algorithm>
 
-#include "backend/graph_change.h"
-#include "backend/graph_restore.h"
-#include "backend/incremental_solver.h"
-#include "backend/information.h"
-#include "backend/keyframe_chain.h"
-#include "backend/keyframe_retirement.h"
-#include "backend/loop_admission.h"
-#include "backend/loop_search.h"
-#include "backend/revision_report.h"
-#include "backend/shadow_graph.h"
+#include "backend/factors/information.h"
+#include "backend/journal/graph_change.h"
+#include "backend/journal/graph_restore.h"
+#include "backend/keyframes/keyframe_chain.h"
+#include "backend/keyframes/keyframe_retirement.h"
+#include "backend/keyframes/revision_report.h"
+#include "backend/loops/loop_admission.h"
+#include "backend/loops/loop_search.h"
+#include "backend/shadow/shadow_graph.h"
 #include "backend/smoother_state.h"
+#include "backend/solver/incremental_solver.h"
 #include "common/config_check.h"
 
 namespace ignis {

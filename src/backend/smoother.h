@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "backend/backend_config.h"
+#include "backend/journal/record_archive.h"
 #include "backend/keyframe_pose.h"
-#include "backend/loop_result.h"
-#include "backend/pose_graph_file.h"
-#include "backend/record_archive.h"
-#include "backend/shadow_optimum.h"
+#include "backend/loops/loop_result.h"
+#include "backend/pose_graph/pose_graph_file.h"
+#include "backend/shadow/shadow_optimum.h"
 #include "common/keyframe.h"
 #include "common/loop_gates.h"
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "backend/loose_odometry.h"
+#include "backend/factors/loose_odometry.h"
 
 namespace ignis {
 

@@ -5,14 +5,14 @@
 #include <deque>
 #include <vector>
 
-#include "backend/cloud_store.h"
-#include "backend/information.h"
-#include "backend/keyframe_factors.h"
+#include "backend/factors/information.h"
+#include "backend/factors/keyframe_factors.h"
+#include "backend/factors/motion_factor.h"
+#include "backend/journal/cloud_store.h"
 #include "backend/keyframe_pose.h"
-#include "backend/loop_result.h"
-#include "backend/motion_factor.h"
-#include "backend/odometry_chain.h"
-#include "backend/place_index.h"
+#include "backend/keyframes/odometry_chain.h"
+#include "backend/loops/loop_result.h"
+#include "backend/loops/place_index.h"
 #include "backend/smoother.h"
 
 namespace ignis {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <format>
 
+#include "frontend/filter/scan_instant.h"
 #include "frontend/lio.h"
-#include "frontend/scan_instant.h"
 
 namespace ignis {
 namespace {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "frontend/kalman_step.h"
+#include "frontend/filter/kalman_step.h"
+#include "frontend/filter/scan_instant.h"
 #include "frontend/lio.h"
-#include "frontend/scan_instant.h"
-#include "frontend/voxel_downsample.h"
+#include "frontend/local_map/voxel_downsample.h"
 
 namespace ignis {
 namespace {

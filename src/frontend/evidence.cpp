@@ -4,8 +4,8 @@
 // whether the vehicle stands.
 #include <cmath>
 
+#include "frontend/filter/standstill.h"
 #include "frontend/lio.h"
-#include "frontend/standstill.h"
 
 namespace ignis {
 namespace {

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <utility>
 
-#include "frontend/scan_instant.h"
-#include "frontend/voxel_downsample.h"
+#include "frontend/filter/scan_instant.h"
+#include "frontend/local_map/voxel_downsample.h"
 
 namespace ignis {
 namespace {

@@ -4,10 +4,10 @@
 // sample, and both across samples that are clipped or missing.
 #include <algorithm>
 
-#include "frontend/error_step.h"
+#include "frontend/filter/error_step.h"
+#include "frontend/filter/standstill.h"
+#include "frontend/filter/steady_motion.h"
 #include "frontend/lio.h"
-#include "frontend/standstill.h"
-#include "frontend/steady_motion.h"
 
 namespace ignis {
 namespace {

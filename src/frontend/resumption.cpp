@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <format>
 
+#include "frontend/filter/steady_motion.h"
 #include "frontend/lio.h"
-#include "frontend/steady_motion.h"
 
 namespace ignis {
 namespace {

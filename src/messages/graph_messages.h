@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "backend/keyframe_pose.h"
-#include "backend/loop_result.h"
+#include "backend/loops/loop_result.h"
 #include "common/nav_state.h"
 #include "common/time.h"
 #include "ignis/loop_result_t.hpp"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "backend/record_archive.h"
+#include "backend/journal/record_archive.h"
 
 namespace ignis::testing {
 

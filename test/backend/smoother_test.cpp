@@ -9,7 +9,7 @@
 #include <map>
 #include <random>
 
-#include "backend/scan_trust.h"
+#include "backend/factors/scan_trust.h"
 #include "backend/synthetic_drive.h"
 #include "backend/text_contains.h"
 #include "common/config_check.h"

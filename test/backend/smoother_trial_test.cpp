@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "backend/loop_search.h"
+#include "backend/loops/loop_search.h"
 #include "backend/smoother.h"
 #include "backend/synthetic_drive.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "backend/odometry_chain.h"
+#include "backend/keyframes/odometry_chain.h"
 #include "common/so3.h"
 
 namespace ignis::testing {

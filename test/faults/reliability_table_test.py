@@ -16,9 +16,9 @@ PYTHON_TEST = re.compile(r"^\s*def (test_\w+)", re.MULTILINE)
 # Where reasons are defined.
 ENUMS = {
     "ScanReason": "src/frontend/scan_stats.h",
-    "LoopReason": "src/backend/loop_result.h",
+    "LoopReason": "src/backend/loops/loop_result.h",
     "KeyframeVerdict": "src/backend/smoother.h",
-    "ImuFault": "src/frontend/imu_buffer.h",
+    "ImuFault": "src/frontend/filter/imu_buffer.h",
 }
 
 

@@ -10,11 +10,11 @@
 
 #include <gtest/gtest.h>
 
-#include "frontend/deskew.h"
 #include "frontend/lio_runner.h"
-#include "frontend/scan_matcher.h"
-#include "frontend/scan_selection.h"
-#include "frontend/voxel_downsample.h"
+#include "frontend/local_map/voxel_downsample.h"
+#include "frontend/matching/deskew.h"
+#include "frontend/matching/scan_matcher.h"
+#include "frontend/matching/scan_selection.h"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "frontend/lio_runner.h"
-#include "frontend/local_map.h"
+#include "frontend/local_map/local_map.h"
 
 namespace ignis::test {
 
