@@ -286,7 +286,7 @@ void Lio::enter_map(const std::vector<CloudPoint>& cloud, const MatchResult& mat
   if (match.stats.applied()) {
     if (match.stats.standing && map_.scans() >= kScansOfASettledMap) return;
     // The covariance of a pose in a young map holds the map's noise, which must not be left behind in it once more, and
-    // the gyro's, which is: the root lies between (docs/front_end_results.md, The heading of a young map). Gravity is
+    // the gyro's, which is: the root lies between (docs/results/accuracy.md, The heading of a young map). Gravity is
     // doubted by the smaller of the two: with the larger one sixteen beams lost their way.
     const double noise = std::sqrt(match.map_noise);
     const double age = match.map_age_scans / noise;

@@ -9,7 +9,7 @@ namespace {
 
 // Information relative to the best known direction, of which half counts as open. As little as that: where scans hold
 // the way but badly, their own factor says it, and a step of the filter's velocity is no acceleration that the IMU has
-// felt. Chosen for corridor, bare corridor and open hall (docs/back_end_results.md).
+// felt. Chosen for corridor, bare corridor and open hall (docs/results/graph_consistency.md).
 constexpr double kOpen = 1e-5;
 
 }  // namespace

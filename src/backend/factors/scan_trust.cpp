@@ -8,7 +8,7 @@
 namespace ignis {
 namespace {
 
-// Chosen for the NEES of the smoothed pose in corridor, open hall, hall and rooms (docs/back_end_results.md).
+// Chosen for the NEES of the smoothed pose in corridor, open hall, hall and rooms (docs/results/graph_consistency.md).
 constexpr double kWeak = 0.3;       // information relative to the best, of which two thirds count
 constexpr double kWeakShare = 0.1;  // of the weakest that counts, before the best is brought to 1
 

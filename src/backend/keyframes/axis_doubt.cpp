@@ -4,7 +4,7 @@
 namespace ignis {
 namespace {
 
-// [rad] One sigma. Chosen for the NEES of a bare corridor, seeds 1 to 10 (docs/back_end_results.md).
+// [rad] One sigma. Chosen for the NEES of a bare corridor, seeds 1 to 10 (docs/results/graph_consistency.md).
 constexpr double kAxisSigma = 0.0015;
 
 }  // namespace

@@ -56,7 +56,7 @@ struct InertialInput {
 [[nodiscard]] NavState predict_backward(const NavState& state, const InertialInput& input, double dt, double gravity);
 
 /// The map, and with it odom, has turned against gravity by an angle of this covariance [rad^2, odom axes]: what bends
-/// away from level must not count as an acceleration (docs/front_end_results.md, Gravity in a map that bends). To first
+/// away from level must not count as an acceleration (docs/results/honesty.md, Gravity in a map that bends). To first
 /// order in the tilt.
 void turn_gravity(ErrorCovariance& covariance, const Eigen::Matrix3d& turn);
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kMostlyShift = 0.7;  // of a unit vector: beyond, it is more shift than turn
 // Signal that a turn takes from a shift, as a share of what errors of the normals explain. Chance makes some 1 / points
 // of it. Straight walls: at most 0.06; bends of 25 m radius: from 0.29, of 12 m 1.2, of 6 m 4.8
-// (docs/front_end_results.md).
+// (docs/results/blind_directions.md, What holds it together where geometry says nothing).
 constexpr double kOwnTurn = 0.1;
 
 /// Adds a direction to an orthonormal list.

@@ -23,7 +23,7 @@ namespace ignis {
 /// How well the smooth planes of a scan hold shifts. Turns are not looked at.
 ///
 /// It is asked of the weakest direction and not of the one that a plane faces: where little tells the way, as in a
-/// door, all that there is stays as it is (docs/front_end_results.md, "Edges that pass for planes").
+/// door, all that there is stays as it is (docs/results/planes.md, "Edges that pass for planes").
 class SmoothSupport {
  public:
   /// A plane with its unit normal. It amounts to `strict`, its strict smoothness.

@@ -28,7 +28,7 @@ constexpr std::size_t kSearchPoints = 200;
 constexpr std::size_t kScorePoints = 600;
 constexpr std::size_t kMostPlaces = 8;
 // From here on: chosen over the same 282 places as kIndependentPoints. In 77 there is doubt, among them all 19 at which
-// a wrong one comes first (docs/front_end_results.md, After a stretch without corrections).
+// a wrong one comes first (docs/results/gaps_and_starts.md, After a stretch without corrections).
 constexpr double kPlaceNoise = 0.1;      // m, sigma: of a point at the right place, attitude and map included
 constexpr double kNoPlane = 0.7;         // what a point counts for that is near the map, but near no plane
 constexpr double kUnmapped = 0.4;        // and one where the map holds nothing within kUnmappedRadius

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMostPlacements = 150;
 // Both were looked for over twelve drives each of four scenes, with 550 points a scan, until the NEES of position and
-// attitude were nearest to one (docs/front_end_results.md, What a scan leaves behind).
+// attitude were nearest to one (docs/results/honesty.md, What a scan leaves behind).
 constexpr double kScansOfAlikeNoise = 12.0;  // the filter averages over some
 // A plane of the map is met by many points of a scan, whose errors are then one.
 constexpr double kPointsThatShareAnError = 14.0;
