@@ -16,7 +16,7 @@ from vehicle_run import CONFIG, SCENE, simulated_vehicle
 from ignis.pipeline import effective_config, enter_private_network
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
-PAGES = [p for p in sorted([*CHECKOUT.glob("*.md"), *(CHECKOUT / "docs").glob("*.md")]) if p.name != "CHANGELOG.md"]
+PAGES = [p for p in sorted([*CHECKOUT.glob("*.md"), *(CHECKOUT / "docs").rglob("*.md")]) if p.name != "CHANGELOG.md"]
 
 # What cannot run in a test, by what the command holds, and why. A row that fits no command any more is an error.
 NOT_RUN = {
@@ -45,6 +45,11 @@ ENDLESS_SECONDS = 8.0
 ANSWERS = {"doctor": {0, 9, 10, 11, 12, 13, 14, 15}, "status": {0, 1}}
 
 
+def name(page: Path) -> str:
+    """A page by its path in the checkout: two folders may have pages of one name."""
+    return page.relative_to(CHECKOUT).as_posix()
+
+
 def shown_commands() -> list[tuple[str, str]]:
     """Page and command line, in the order of the pages."""
     found = []
@@ -55,7 +60,7 @@ def shown_commands() -> list[tuple[str, str]]:
                 fenced = not fenced
             command = line.strip()
             if (fenced or line.startswith(("    ", "\t"))) and re.match(r"(sudo |\./ignis |packaging/)", command):
-                found.append((page.name, command))
+                found.append((name(page), command))
     return found
 
 
@@ -90,8 +95,8 @@ def ignis(folder: Path, command: str) -> subprocess.Popen:
 def scratch(private_network, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder that holds what the pages take for granted, while a simulated vehicle drives."""
     folder = tmp_path_factory.mktemp("docs")
-    for place in (folder, *(folder / page.name for page in PAGES)):
-        place.mkdir(exist_ok=True)
+    for place in (folder, *(folder / name(page) for page in PAGES)):
+        place.mkdir(parents=True, exist_ok=True)
         (place / "config").symlink_to(CHECKOUT / "config")
     shutil.copy(CHECKOUT / "config" / "ignis8.json", folder / "other.json")
     shutil.copy(CHECKOUT / "config" / "schema.json", folder)
@@ -100,8 +105,8 @@ def scratch(private_network, tmp_path_factory: pytest.TempPathFactory) -> Iterat
         line = [*simulate, "--duration", "14", *output, "--ground-truth", "truth.tum"]
         subprocess.run(line, cwd=folder, check=True, capture_output=True)
     shutil.copy(folder / "truth.tum", folder / "peer.tum")
-    for name in ("drive", "seed1", "seed2"):
-        done = ignis(folder, f"./ignis replay drive.lcmlog --out results/{name}")
+    for drive in ("drive", "seed1", "seed2"):
+        done = ignis(folder, f"./ignis replay drive.lcmlog --out results/{drive}")
         assert done.wait(120) == 0, done.communicate()[0]
     with simulated_vehicle(tmp_path_factory.mktemp("driving")):
         os.environ["LCM_DEFAULT_URL"] = effective_config(CONFIG)["lcm"]["url"]
@@ -116,8 +121,8 @@ def test_command_runs_as_the_page_shows_it(scratch: Path, page: str, command: st
     process = ignis(scratch / page if endless else scratch, command)
     try:
         output, _ = process.communicate(timeout=ENDLESS_SECONDS if endless else 180.0)
-        name = shlex.split(command)[1]
-        assert process.returncode in ANSWERS.get(name, {0}), f"{page}: {command}\n{output}"
+        answers = ANSWERS.get(shlex.split(command)[1], {0})
+        assert process.returncode in answers, f"{page}: {command}\n{output}"
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGINT)
         output, _ = process.communicate(timeout=30.0)
