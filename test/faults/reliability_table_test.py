@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/reliability.md holds every row of the fault list, and each test that it names exists; every reason is tested."""
+"""docs/reliability.md and its pages: every row of the fault list, tests that exist, and a test for every reason."""
 
 import os
 import re
@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(os.environ["IGNIS_CHECKOUT"])
-TABLE = CHECKOUT / "docs" / "reliability.md"
+OVERVIEW = CHECKOUT / "docs" / "reliability.md"
+PAGES = CHECKOUT / "docs" / "reliability"
+ROW = re.compile(r"^\| \[([A-Z]\d+)\]\(([^)]+)\) \|[^|]*\| (holds|in part|open) \|", re.MULTILINE)
+SECTION = re.compile(r"^## ([A-Z]\d+): .*?(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 ROWS = {"D": 6, "F": 11, "B": 7, "T": 2, "G": 5, "M": 4, "W": 8, "L": 4, "C": 4, "P": 9}
 CPP_TEST = re.compile(r"^(?:TEST|TEST_F|TEST_P|TYPED_TEST)\((\w+),\s*(\w+)", re.MULTILINE)
 PYTHON_TEST = re.compile(r"^\s*def (test_\w+)", re.MULTILINE)
@@ -38,23 +41,29 @@ def existing_tests() -> set[str]:
     return found
 
 
-def table_rows() -> dict[str, str]:
-    """The table's rows by their number."""
-    lines = (line for line in TABLE.read_text().splitlines() if re.match(r"\| [A-Z]\d+ \|", line))
-    return {line.split("|")[1].strip(): line for line in lines}
+def sections() -> dict[str, str]:
+    """What the pages say of each row, by its number."""
+    return {match[1]: match[0] for page in PAGES.glob("*.md") for match in SECTION.finditer(page.read_text())}
 
 
-def test_every_row_of_the_fault_list_stands_in_the_table() -> None:
+def test_every_row_of_the_fault_list_stands_in_the_table_and_has_a_section() -> None:
     expected = {f"{letter}{number}" for letter, count in ROWS.items() for number in range(1, count + 1)}
-    assert set(table_rows()) == expected
+    assert {number for number, _, _ in ROW.findall(OVERVIEW.read_text())} == expected
+    assert set(sections()) == expected
 
 
-def test_every_test_that_the_table_names_exists() -> None:
+def test_the_table_says_what_the_sections_say() -> None:
+    for number, link, result in ROW.findall(OVERVIEW.read_text()):
+        assert f"**{result.capitalize()}.**" in sections()[number], number
+        page = OVERVIEW.parent / link.split("#")[0]
+        assert f"## {number}: " in page.read_text(), (number, link)
+
+
+def test_every_test_that_a_section_names_exists() -> None:
     existing = existing_tests()
-    for number, line in table_rows().items():
-        column = line.split("|")[3]
-        named = re.findall(r"`([^`]+)`", column)
-        assert named or "none" in column, f"{number}: neither a test nor a word about its absence"
+    for number, text in sections().items():
+        named = re.findall(r"^- `([^`]+)`$", text, re.MULTILINE)
+        assert named, f"{number}: no test"
         missing = [name for name in named if name not in existing]
         assert not missing, (number, missing)
 
