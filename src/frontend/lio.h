@@ -106,6 +106,7 @@ class Lio {
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
                                     double age);
   [[nodiscard]] Reacquisition place_to_begin() const;
+  [[nodiscard]] MapScans salient_scans() const;
   [[nodiscard]] int sure_since(double sigma_m) const;
   /// [m^2] odom axes.
   [[nodiscard]] Eigen::Matrix3d published_position_covariance() const;

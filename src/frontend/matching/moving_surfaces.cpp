@@ -116,7 +116,7 @@ const std::vector<bool>& MovingSurfaces::judge(std::span<const MatchedSurface> s
     return direction.is_faced_by_few && variance > kKnownSpeed * kKnownSpeed;
   });
   if (speed_is_known) unrest_ *= std::exp(-prior.seconds / kMemory);
-  if (is_contested && !pose_is_off && prior.seconds > 0.0) unrest_ += 1.0;
+  if (is_contested && !pose_is_off && speed_is_known && prior.seconds > 0.0) unrest_ += 1.0;
   restless_ = unrest_ > (restless_ ? kQuiet : kRestless);
   if (unrest_ < kDoubtful || pose_is_off) return moved_;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {

@@ -10,7 +10,6 @@
 #include "common/so3.h"
 #include "frontend/filter/regained_view.h"
 #include "frontend/planes/plane_jacobian.h"
-#include "frontend/planes/rough_planes.h"
 #include "frontend/planes/square_sum.h"
 
 namespace ignis {
@@ -58,12 +57,12 @@ ScanMatcher::ScanMatcher(const FrontendConfig& config)
 }
 
 MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start,
-                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map, int salient_since,
-                               std::span<const Eigen::Vector3d> doubtful) {
-  salient_since_ = salient_since;
-  untold_velocity_.block<3, 3>(kVelocity, kVelocity) = projector_on(doubtful);
+                               std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
+                               const KnownBefore& known) {
+  salient_scans_ = known.salient;
+  untold_velocity_.block<3, 3>(kVelocity, kVelocity) = projector_on(known.doubtful);
   speed_is_known_ = largest_sigma(predicted.covariance, kVelocity) < kKnownSpeed;
-  expect(predicted);
+  expect(predicted, known);
   MatchResult result;
   result.filter = predicted;
   result.filter.nominal.T_odom_body = T_start;
@@ -139,19 +138,6 @@ void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> p
   pooled_variance_ = variance_sum / count;
 }
 
-void ScanMatcher::weigh_rough_planes() {
-  const auto strict = [this](const Constraint& constraint) {
-    const double variance = unexplained_variance(constraint.plane, config_.range_noise_m);
-    return strict_smoothness(plane_smoothness(variance, config_.smooth_plane_m));
-  };
-  SmoothSupport support;
-  for (const Constraint& constraint : constraints_) support.add(constraint.plane.normal, strict(constraint));
-  const double sufficiency = support.sufficiency(config_.enough_smooth_planes);
-  for (Constraint& constraint : constraints_) {
-    constraint.hearing += sufficiency * (strict(constraint) - constraint.hearing);
-  }
-}
-
 double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, const Eigen::Vector3d& query,
                                    const Eigen::Vector3d& seen_from, const LocalMap& map) const {
   const double of_all = plane.normal.dot(query + plane.offset);
@@ -163,12 +149,13 @@ double ScanMatcher::distance_along(const PlaneFit& plane, double smoothness, con
   return own ? of_all + (1.0 - smoothness) * (plane.normal.dot(*own) - of_all) : of_all;
 }
 
-void ScanMatcher::expect(const FilterState& predicted) {
+void ScanMatcher::expect(const FilterState& predicted, const KnownBefore& known) {
   const Utime now = predicted.nominal.utime;
   if (last_scan_ > 0) scan_seconds_ += kShareOfNewestScan * (seconds_between(last_scan_, now) - scan_seconds_);
   T_odom_predicted_ = predicted.nominal.T_odom_body;
   prior_.position_covariance = predicted.covariance.block<3, 3>(kPosition, kPosition);
-  prior_.velocity_covariance = predicted.covariance.block<3, 3>(kVelocity, kVelocity);
+  prior_.velocity_covariance =
+      known.velocity_covariance.value_or(predicted.covariance.block<3, 3>(kVelocity, kVelocity));
   prior_.seconds = last_scan_ > 0 ? seconds_between(last_scan_, now) : 0.0;
   last_scan_ = now;
 }
@@ -341,7 +328,7 @@ SalientPart ScanMatcher::find_salient(const FilterState& at) {
   const Eigen::Matrix3d R = at.nominal.T_odom_body.rotation.toRotationMatrix();
   std::vector<Eigen::Vector3d> axes;
   const auto counts = [&](const Constraint& constraint) {
-    if (constraint.plane.mean_scan < salient_since_) return false;
+    if (!salient_scans_.contain(constraint.plane.mean_scan)) return false;
     blind_shifts_of_point(degeneracy_, R, constraint.point_body, axes);
     const bool salient = is_salient(constraint.plane, axes, pooled_variance_, config_.salient_sigma);
     if (salient) {

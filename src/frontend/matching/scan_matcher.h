@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -48,6 +49,28 @@ struct MatchResult {
   Matrix6d disagreement = Matrix6d::Zero();
 };
 
+/// Scans of a map, by their numbers, both included.
+struct MapScans {
+  int first = 0;
+  int last = std::numeric_limits<int>::max();
+
+  [[nodiscard]] bool contain(double scan) const { return first <= scan && scan <= last; }
+};
+
+/// What is known of a scan's prediction beside its state.
+struct KnownBefore {
+  /// The scans of the map whose planes may count as salient. Along a blind direction the pose may have moved against
+  /// older ones by more than the matcher reaches, and what it meets then is something else. What newer ones mapped may
+  /// have moved along with a velocity that is wrong.
+  MapScans salient = {};
+  /// Orthonormal axes (odom) along which the place may be a wrong one (see reacquire). The step to it says nothing
+  /// about the velocity there: in a wrong place the error of that would be seen by nobody.
+  std::span<const Eigen::Vector3d> doubtful = {};
+  /// [m^2/s^2, odom axes] What tells moving surfaces from standing ones: with a velocity that is taken for better than
+  /// it is, a standing world moves. Where nothing is given the prediction's own.
+  std::optional<Eigen::Matrix3d> velocity_covariance = std::nullopt;
+};
+
 /// Corrects a predicted state by matching deskewed points against planes of the local map: assessment, quality gate,
 /// iterated update, trust region. The map is only read; what is kept from scan to scan is which directions were
 /// observed.
@@ -56,13 +79,9 @@ class ScanMatcher {
   explicit ScanMatcher(const FrontendConfig& config);
 
   /// `T_start`: where to look for planes first; the predicted pose, unless that is too far off (see reacquire).
-  /// `salient_since`: the first scan of the map whose planes may count as salient. Along a blind direction the pose may
-  /// have moved against older ones by more than the matcher reaches, and what it meets then is something else.
-  /// `doubtful`: orthonormal axes (odom) along which the place may be a wrong one (see reacquire). The step to it says
-  /// nothing about the velocity there: in a wrong place the error of that would be seen by nobody.
   [[nodiscard]] MatchResult match(const FilterState& predicted, const Pose& T_start,
                                   std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
-                                  int salient_since = 0, std::span<const Eigen::Vector3d> doubtful = {});
+                                  const KnownBefore& known = {});
 
   /// True while surfaces are found to move along a direction that few others face, see MovingSurfaces.
   [[nodiscard]] bool is_restless() const { return moving_surfaces_.is_restless(); }
@@ -93,7 +112,7 @@ class ScanMatcher {
   };
 
   /// Notes what is known without the scan.
-  void expect(const FilterState& predicted);
+  void expect(const FilterState& predicted, const KnownBefore& known);
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
   /// Where a plane lies along its normal [m]. Of a smooth one all neighbours tell. Where an edge or a corner passes for
   /// a plane, their mean is off to one side, before the edge or behind it, alike in scan after scan: the rougher the
@@ -144,7 +163,7 @@ class ScanMatcher {
   double mean_range_ = 1.0;
   double mean_map_scan_ = 0.0;    ///< number of the scan that a met map point comes from
   double pooled_variance_ = 0.0;  ///< see is_salient
-  int salient_since_ = 0;
+  MapScans salient_scans_;
   /// Projects on what a doubtful place says nothing of, see match().
   ErrorCovariance untold_velocity_ = ErrorCovariance::Zero();
   bool speed_is_known_ = false;

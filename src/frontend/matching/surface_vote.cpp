@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which of the surfaces that a scan was matched with have a vote: what moves, or may, has none.
+// Which of the surfaces that a scan was matched with have a vote: what moves, or may, has none, and what is rough has
+// less of one.
 #include <algorithm>
 #include <iterator>
 #include <vector>
 
+#include "common/plane_smoothness.h"
 #include "frontend/matching/scan_matcher.h"
+#include "frontend/planes/rough_planes.h"
 
 namespace ignis {
 namespace {
@@ -44,6 +47,19 @@ void ScanMatcher::leave_out_new_surfaces(int newest_scan) {
   const double needed =
       std::max(kLeastSettledShare * static_cast<double>(constraints_.size()), static_cast<double>(config_.min_matches));
   if (static_cast<double>(settled) >= needed) std::erase_if(constraints_, is_new);
+}
+
+void ScanMatcher::weigh_rough_planes() {
+  const auto strict = [this](const Constraint& constraint) {
+    const double variance = unexplained_variance(constraint.plane, config_.range_noise_m);
+    return strict_smoothness(plane_smoothness(variance, config_.smooth_plane_m));
+  };
+  SmoothSupport support;
+  for (const Constraint& constraint : constraints_) support.add(constraint.plane.normal, strict(constraint));
+  const double sufficiency = support.sufficiency(config_.enough_smooth_planes);
+  for (Constraint& constraint : constraints_) {
+    constraint.hearing += sufficiency * (strict(constraint) - constraint.hearing);
+  }
 }
 
 }  // namespace ignis

@@ -58,7 +58,7 @@ void MapDrift::remember(int scan, const Eigen::Matrix3d& position_covariance, co
   view_.remember(position_covariance, blind);
   if (!placements_.empty() && scan < placements_.back().scan) placements_.clear();
   if (!placements_.empty() && scan == placements_.back().scan) return;  // did not enter the map
-  placements_.push_back({scan, position_covariance, position_covariance - shift_by_tilt(position)});
+  placements_.push_back({scan, position, position_covariance, position_covariance - shift_by_tilt(position)});
   if (placements_.size() > kMostPlacements) forget_one();
 }
 
@@ -87,6 +87,12 @@ int MapDrift::sure_since(const Eigen::Matrix3d& position_covariance, const Eigen
   if (last_doubtful == placements_.rend()) return 0;
   const auto first_sure = last_doubtful.base();
   return first_sure == placements_.end() ? placements_.back().scan + 1 : first_sure->scan;
+}
+
+int MapDrift::newest_beyond(double distance_m, const Eigen::Vector3d& position) const {
+  const auto beyond = [&](const Placement& then) { return (then.position - position).norm() >= distance_m; };
+  const auto newest = std::ranges::find_if(placements_.rbegin(), placements_.rend(), beyond);
+  return newest == placements_.rend() ? -1 : newest->scan;
 }
 
 void MapDrift::hold_to(double scan, std::span<const Eigen::Vector3d> axes, const Pose& T_odom_body) {

@@ -65,6 +65,9 @@ class MapDrift {
   [[nodiscard]] int sure_since(const Eigen::Matrix3d& position_covariance, const Eigen::Vector3d& position,
                                double sigma_m) const;
 
+  /// The newest scan that was placed at least `distance_m` from `position`; -1 when none that is remembered was.
+  [[nodiscard]] int newest_beyond(double distance_m, const Eigen::Vector3d& position) const;
+
   /// The pose was measured along unit `axes` (odom) against planes that scan number `scan` mapped. What that takes from
   /// the filter's covariance is only known against those planes: along these axes the position is never known better
   /// than it was when they were placed.
@@ -85,11 +88,13 @@ class MapDrift {
  private:
   struct Placement {
     int scan = 0;
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
     Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
     Eigen::Matrix3d in_map = Eigen::Matrix3d::Zero();  ///< the same without the tilt of the start
 
     friend void transfer(auto& io, FieldsOf<Placement> auto& placement) {
       io.number(placement.scan);
+      io.matrix(placement.position);
       io.matrix(placement.position_covariance);
       io.matrix(placement.in_map);
     }

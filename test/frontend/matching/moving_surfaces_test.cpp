@@ -96,6 +96,13 @@ TEST(MovingSurfaces, AVehicleThatDoesNotKnowItsSpeedSeesAllMoveAndBelievesIt) {
   EXPECT_EQ(street.scan(0.1), 0);
 }
 
+TEST(MovingSurfaces, AVehicleThatDoesNotKnowItsSpeedFindsNoUnrest) {
+  Street street;
+  street.know_speed_to(0.2);
+  for (int i = 0; i < 50; ++i) street.scan(0.2);
+  EXPECT_FALSE(street.judge.is_restless());
+}
+
 TEST(MovingSurfaces, WhatIsOldHasNotMoved) {
   Street street;
   for (int i = 0; i < 10; ++i) EXPECT_EQ(street.scan(0.4, 3.0), 0) << "the map or the pose is off";

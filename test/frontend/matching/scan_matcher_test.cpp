@@ -58,7 +58,7 @@ TEST_F(ScanMatcherTest, AStepToADoubtfulPlaceSaysNothingOfTheVelocityThere) {
   predicted_.nominal.T_odom_body.translation = {0.03, 0.0, 0.03};
   const std::array<Eigen::Vector3d, 1> doubtful{Eigen::Vector3d::UnitZ()};
   const MatchResult result = ScanMatcher(config_).match(predicted_, predicted_.nominal.T_odom_body, standing_.newest,
-                                                        standing_.map, 0, doubtful);
+                                                        standing_.map, {.doubtful = doubtful});
   ASSERT_TRUE(result.stats.applied());
   EXPECT_LT(result.filter.nominal.T_odom_body.translation.norm(), 0.01) << "the position is corrected";
   EXPECT_NEAR(result.filter.nominal.v_odom.z(), 0.0, 1e-9);
@@ -88,11 +88,11 @@ class CorridorEnd : public ::testing::Test {
     predicted_.nominal.T_odom_body.translation.z() = 0.02;
   }
 
-  [[nodiscard]] MatchResult match(int salient_since = 0) const {
+  [[nodiscard]] MatchResult match(MapScans salient = {}) const {
     ScanMatcher matcher(config_);
     MatchResult result;
     for (const auto& scan : scans_) {
-      result = matcher.match(predicted_, predicted_.nominal.T_odom_body, scan, map_, salient_since);
+      result = matcher.match(predicted_, predicted_.nominal.T_odom_body, scan, map_, {.salient = salient});
     }
     return result;
   }
@@ -117,7 +117,13 @@ TEST_F(CorridorEnd, HoldsTheAxisByItsPointsAlone) {
 }
 
 TEST_F(CorridorEnd, IsLeftOutWhenItWasMappedBeforeThePoseCouldMoveAgainstIt) {
-  const MatchResult without = match(map_.scans() + 1);
+  const MatchResult without = match({.first = map_.scans() + 1});
+  EXPECT_EQ(without.salient.constraints.count, 0);
+  EXPECT_EQ(without.stats.degenerate_directions, 1);
+}
+
+TEST_F(CorridorEnd, IsLeftOutWhenItWasMappedFromNearby) {
+  const MatchResult without = match({.last = -1});
   EXPECT_EQ(without.salient.constraints.count, 0);
   EXPECT_EQ(without.stats.degenerate_directions, 1);
 }
@@ -135,7 +141,7 @@ TEST_F(CorridorEnd, ThatContradictsItselfIsNoDisagreementAboutAnAxisThatIsNotObs
       if (point.z() < -7.0F) point.z() += std::exchange(off, -off);
     }
   }
-  const MatchResult result = match(map_.scans() + 1);
+  const MatchResult result = match({.first = map_.scans() + 1});
   ASSERT_TRUE(result.stats.applied());
   EXPECT_EQ(result.stats.degenerate_directions, 1);
   EXPECT_LT(result.disagreement(kPosition + 2, kPosition + 2), 1e-9);

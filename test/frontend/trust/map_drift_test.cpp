@@ -119,6 +119,15 @@ struct Drifted : ::testing::Test {
   const std::array<Eigen::Vector3d, 1> along{Eigen::Vector3d::UnitZ()};
 };
 
+TEST_F(Drifted, TheNewestScanFarFromHereIsTheLastOneBeforeTheWayBack) {
+  Eigen::Vector3d position = kStart.translation;
+  EXPECT_EQ(drift.newest_beyond(0.5, position), -1);
+  position.z() -= 2.0;
+  drift.remember(220, 4.0 * Eigen::Matrix3d::Identity(), position, {});
+  EXPECT_EQ(drift.newest_beyond(0.5, position), 210);
+  EXPECT_EQ(drift.newest_beyond(0.5, kStart.translation), 220);
+}
+
 TEST_F(Drifted, APoseHeldByAPlaneIsKnownNoBetterThanWhenThePlaneWasMapped) {
   drift.hold_to(110.0, along, kStart);
   EXPECT_NEAR(variances().z(), 1.0, 1e-12);
