@@ -16,11 +16,11 @@ SIZE = {"width": 320, "height": 200}  # drawn in software, beside the processes 
 
 
 class WatchedPages:
-    """Some tabs with the view in a headless Chromium each, as viewers on computers of their own have them."""
+    """The view in some headless Chromiums, a tab each, as viewers on computers of their own have it."""
 
     def __init__(self, address: str, number: int, folder: Path) -> None:
         self._address, self._number, self._folder = address, number, folder
-        self._stack = ExitStack()
+        self._browsers = ExitStack()
         self._pages: list[tuple[ViewPage, CDPSession]] = []
         self._heaps_mb: list[list[float]] = []
         self._next_look_s = 0.0
@@ -28,21 +28,23 @@ class WatchedPages:
     def __enter__(self) -> WatchedPages:
         if self._number == 0:
             return self
-        playwright = self._stack.enter_context(sync_playwright())
-        for index in range(self._number):
-            folder = self._folder / f"browser{index}"
-            folder.mkdir()
-            browser = launch(playwright, folder)
-            self._stack.callback(browser.close)
-            view = ViewPage(browser, self._address, **SIZE)
-            session = view.context.new_cdp_session(view.page)
-            session.send("Performance.enable")
-            self._pages.append((view, session))
-            self._heaps_mb.append([])
+        with ExitStack() as started:  # and ended again should one of them not start
+            playwright = started.enter_context(sync_playwright())
+            for index in range(self._number):
+                folder = self._folder / f"browser{index}"
+                folder.mkdir()
+                browser = launch(playwright, folder)
+                started.callback(browser.close)
+                view = ViewPage(browser, self._address, **SIZE)
+                session = view.context.new_cdp_session(view.page)
+                session.send("Performance.enable")
+                self._pages.append((view, session))
+                self._heaps_mb.append([])
+            self._browsers = started.pop_all()
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._stack.close()
+        self._browsers.close()
 
     def look(self, now_s: float) -> None:
         """Notes what the pages' scripts hold, every now and then."""
