@@ -19,11 +19,20 @@ constexpr double kSecondsWithoutTrail = 1.5;  // behind a rest
 constexpr double kUnevenStep = 0.03;          // m: of the position, beyond what the velocity explains
 constexpr double kUnevenSpeed = 0.03;         // m/s
 
-void take_from_velocity(FilterState& filter, const VelocityError& error) {
+void take_from_velocity(FilterState& filter, const VelocityError& error,
+                        const ErrorVector& learns = ErrorVector::Ones()) {
   Eigen::Matrix<double, 1, kErrorSize> derivative = Eigen::Matrix<double, 1, kErrorSize>::Zero();
   derivative.segment<3>(kVelocity) = error.direction.transpose();
   kalman_step<1>(filter, Eigen::Matrix<double, 1, 1>(error.along), derivative,
-                 Eigen::Matrix<double, 1, 1>(error.variance));
+                 Eigen::Matrix<double, 1, 1>(error.variance), learns);
+}
+
+/// Weak shifts may have put the velocity right since, and the position was held to a map that came along with it: the
+/// velocity's error now no longer tells the position's.
+ErrorVector all_but_position() {
+  ErrorVector learns = ErrorVector::Ones();
+  learns.segment<3>(kPosition).setZero();
+  return learns;
 }
 
 /// Beside what the scan does not observe.
@@ -152,7 +161,7 @@ void Lio::heed_sighted_walls(const FilterState& predicted, const MatchResult& ma
     const std::optional<VelocityError> error = sighted_walls_.judge(axis, sigma, config_.imu_noise_accel);
     if (!error) continue;
     FilterState cautious{filter_.nominal, cautious_};
-    take_from_velocity(cautious, *error);
+    take_from_velocity(cautious, *error, all_but_position());
     cautious_ = cautious.covariance;
     const double speed = error->direction.dot(filter_.nominal.v_odom) - error->along;
     take_from_velocity(filter_, *error);

@@ -73,6 +73,7 @@ struct FrontendConfig {
   double lost_sigma_m = 1.0;
   int min_scan_points = 50;
   int min_matches = 20;
+  double min_plane_width_m = 0.0;
   double smooth_plane_m = 0.0;
   double enough_smooth_planes = 0.0;
   double range_noise_m = 0.0;
@@ -226,6 +227,9 @@ struct FrontendConfig {
                  "largest position sigma of a pose that is still of use");
     visit.integer("min_scan_points", self.min_scan_points, {1, 100000}, "points", "fewer: the scan is skipped");
     visit.integer("min_matches", self.min_matches, {6, 100000}, "points", "planes that a scan needs");
+    visit.number("min_plane_width_m", self.min_plane_width_m, {0.0, 1.0}, "m",
+                 "spread of the neighbours along the narrow side of their plane below which noise may have made it "
+                 "(line); 0: any");
     visit.number("smooth_plane_m", self.smooth_plane_m, {0.0, 1.0}, "m",
                  "a plane of this roughness counts half as much as a perfect one; 0: all count alike");
     visit.number("enough_smooth_planes", self.enough_smooth_planes, {0.0, 1e4}, "planes",

@@ -17,6 +17,8 @@ namespace {
 using test::Drive;
 using test::LioRun;
 
+constexpr double kHardlyNamed = 0.05;  // share of the scans that report the axis while an end is in sight
+
 test::World closed_corridor(double end_m = 11.5) {
   test::World world = test::bare_corridor();
   world.room.lo.z() = -end_m;
@@ -60,7 +62,7 @@ TEST(LioCorridor, AnEndInSightHoldsTheAxis) {
     const Along along = along_corridor(test::tuned_config(), drive_in(closed_corridor(), seed));
     EXPECT_LT(along.error, 0.08) << "seed " << seed;
     EXPECT_LT(along.sigma, 0.05) << "seed " << seed;
-    EXPECT_LT(along.share_named, 0.05) << "seed " << seed;
+    EXPECT_LT(along.share_named, kHardlyNamed) << "seed " << seed;
   }
 }
 
@@ -182,7 +184,7 @@ TEST(LioCorridor, TheEndIsOverlookedWithoutSalientPoints) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     share_named += 0.2 * along_corridor(config, drive_in(closed_corridor(), seed)).share_named;
   }
-  EXPECT_GT(share_named, 0.3) << "else the tests above would hold without them";
+  EXPECT_GT(share_named, 5.0 * kHardlyNamed) << "else the tests above would hold without them";
 }
 
 /// What the first keyframe behind the start says of the way along the corridor.

@@ -162,7 +162,9 @@ void fit_four_planes(const FourMoments& moments, const FrontendConfig& config, d
   const float reach = static_cast<float>(config.max_centroid_offset * radius);
   const float roughest = static_cast<float>(config.max_surface_roughness);
   const LaneMask flat = lambda[0] < static_cast<float>(config.max_curvature) * lambda[2];
-  const LaneMask wide = lambda[1] > static_cast<float>(config.min_spread) * lambda[2];
+  const float narrowest = static_cast<float>(config.min_plane_width_m);
+  const LaneMask wide =
+      (lambda[1] > static_cast<float>(config.min_spread) * lambda[2]) & (lambda[1] >= all(narrowest * narrowest));
   const LaneMask around = dot(tangential, tangential) <= all(reach * reach);
   const LaneMask smooth = lambda[0] <= all(roughest * roughest);
 

@@ -32,7 +32,7 @@ PlaneFit fit_plane(const NeighbourMoments& moments, const FrontendConfig& config
   const double tangential = (fit.offset - fit.normal * fit.normal.dot(fit.offset)).norm();
   if (!(lambda[0] < config.max_curvature * lambda[2])) {
     fit.verdict = PlaneVerdict::kBlob;
-  } else if (!(lambda[1] > config.min_spread * lambda[2])) {
+  } else if (!(lambda[1] > config.min_spread * lambda[2] && std::sqrt(lambda[1]) >= config.min_plane_width_m)) {
     fit.verdict = PlaneVerdict::kLine;
   } else if (!(tangential <= config.max_centroid_offset * radius)) {
     fit.verdict = PlaneVerdict::kOneSided;

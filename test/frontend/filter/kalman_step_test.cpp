@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <random>
 
 namespace ignis {
@@ -53,6 +54,23 @@ TEST(KalmanStep, IsTheInformationForm) {
     EXPECT_LT((after.covariance - covariance).norm(), 1e-9 * covariance.norm());
     EXPECT_LT((difference(before.nominal, after.nominal) - step).norm(), 1e-9);
   }
+}
+
+TEST(KalmanStep, WhatIsConsideredLearnsNothingAndTheRestAllTheSame) {
+  const Measured<6> measured = some_numbers<6>(4);
+  FilterState full = some_filter();
+  FilterState considered = full;
+  ErrorVector learns = ErrorVector::Ones();
+  learns.segment<3>(kPosition).setZero();
+  kalman_step(full, measured.residual, measured.derivative, measured.variance);
+  kalman_step(considered, measured.residual, measured.derivative, measured.variance, learns);
+  const FilterState before = some_filter();
+  const auto part = [](const ErrorCovariance& of, ErrorBlock block) { return of.block<3, 3>(block, block).eval(); };
+  EXPECT_LT((part(considered.covariance, kPosition) - part(before.covariance, kPosition)).norm(), 1e-12);
+  EXPECT_LT((part(considered.covariance, kVelocity) - part(full.covariance, kVelocity)).norm(), 1e-9);
+  EXPECT_EQ(considered.nominal.T_odom_body.translation, before.nominal.T_odom_body.translation);
+  EXPECT_LT((considered.nominal.v_odom - full.nominal.v_odom).norm(), 1e-9);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<ErrorCovariance>(considered.covariance).eigenvalues().minCoeff(), 0.0);
 }
 
 TEST(KalmanStep, OfAllNumbersAtOnceIsThatOfOneAfterTheOther) {

@@ -70,6 +70,7 @@ class RandomNeighbourhoods {
 FrontendConfig gates() {
   FrontendConfig config;
   config.max_surface_roughness = 0.015;
+  config.min_plane_width_m = 0.02;
   config.match_radius_m = 0.2;
   return config;
 }
@@ -80,6 +81,7 @@ bool is_clear(const NeighbourMoments& moments, PlaneVerdict verdict, double radi
     FrontendConfig config = gates();
     config.max_curvature *= factor;
     config.min_spread *= factor;
+    config.min_plane_width_m *= factor;
     config.max_centroid_offset *= factor;
     config.max_surface_roughness *= factor;
     if (fit_plane(moments, config, radius).verdict != verdict) return false;

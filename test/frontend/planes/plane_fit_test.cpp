@@ -77,6 +77,24 @@ TEST(PlaneFit, RefusesALine) {
   EXPECT_EQ(fit_plane(moments, {}).verdict, PlaneVerdict::kLine);
 }
 
+// Points of one wall in two layers of voxels: two columns of two means each, 2 cm apart by noise.
+TEST(PlaneFit, RefusesALineThatNoiseHasWidened) {
+  FrontendConfig config;
+  config.min_plane_points = 4;
+  config.max_curvature = 0.3;
+  const auto verdict_at = [&](double width) {
+    NeighbourMoments moments;
+    for (const double along : {-0.06, 0.06}) {
+      for (const double side : {-0.5, 0.5}) moments.add({.offset = {along, side * width, 0.02 * along * side}});
+    }
+    return fit_plane(moments, config).verdict;
+  };
+  EXPECT_EQ(verdict_at(0.05), PlaneVerdict::kPlane);
+  config.min_plane_width_m = 0.03;
+  EXPECT_EQ(verdict_at(0.05), PlaneVerdict::kLine);
+  EXPECT_EQ(verdict_at(0.07), PlaneVerdict::kPlane);
+}
+
 TEST(PlaneFit, RefusesAOneSidedCluster) {
   const NeighbourMoments moments = grid(Eigen::Quaterniond::Identity(), 0.3, {0.15, 0.0, 0.0});
   EXPECT_EQ(fit_plane(moments, {}).verdict, PlaneVerdict::kOneSided);
