@@ -84,6 +84,7 @@ def test_fault_f10_a_vehicle_that_noise_sets_off_where_nothing_is_in_sight_is_no
 
 
 def test_fault_f10_a_vehicle_that_noise_sets_off_where_nothing_is_in_sight_tells_how_lost_it_is(tmp_path: Path) -> None:
+    """With the shipped settings seed 97 ends 11 m off; what is asked is that this is told."""
     for row in _of_starts_that_noise_sets_off(tmp_path, _CONFIG / "ignis8_tuned.json"):
         assert row["nees_position"] <= 3.0 and row["silent_percent"] <= 3.0, f"seed {row['seed']}"
 

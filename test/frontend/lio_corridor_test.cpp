@@ -17,7 +17,7 @@ namespace {
 using test::Drive;
 using test::LioRun;
 
-constexpr double kHardlyNamed = 0.05;  // share of the scans that report the axis while an end is in sight
+constexpr double kHardlyNamed = 0.05;  // share of the scans that report the axis although an end is in sight
 
 test::World closed_corridor(double end_m = 11.5) {
   test::World world = test::bare_corridor();

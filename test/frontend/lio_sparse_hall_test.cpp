@@ -10,7 +10,7 @@
 namespace ignis {
 namespace {
 
-/// Things 6 to 27 m ahead, the walls beside out of range, and a ceiling on the border between two layers of voxels.
+/// Things 6 to 27 m ahead, the walls beside out of range, and a ceiling that noise puts in two layers of voxels.
 test::World sparse_hall() {
   test::World world;
   world.room = {.lo = {-25.0, -0.6, -45.0}, .hi = {25.0, 6.4, 15.0}};
@@ -21,8 +21,9 @@ test::World sparse_hall() {
   return world;
 }
 
-// Four means of a ceiling's points from two columns of voxels make a "plane" that leans by 20 to 90 degrees. A handful
-// of them among 250 held the vehicle at a third of its speed, every direction observed.
+// Four to seven means of a ceiling's points that lie within 2 to 3 cm of a line make a "plane" that leans by 20 to 90
+// degrees. A handful of them among 250 held the vehicle at a third of its speed, every direction observed. Of 32 drives
+// 30 have a NEES below 4; without the gate 22 have one of 6 and more.
 TEST(LioSparseHall, IsNotHeldByLinesThatNoiseHasWidened) {
   test::Sensors sensors;
   sensors.range_sigma = 0.02;

@@ -57,9 +57,9 @@ struct PlaneFit {
 
 /// Principal component fit with the reference's gates: number, curvature, spread, one-sidedness, roughness.
 ///
-/// Spread also in metres: a wall near the border between voxels puts its points in two layers of them, and four means
-/// from two columns are a line that noise has widened. Its normal is 20 to 90 degrees off, and its own scatter, small
-/// both ways, does not say so.
+/// Spread also in metres: noise puts the points of a wall in two layers of voxels, and a few means from neighbouring
+/// columns may lie within 2 to 3 cm of a line. Such a width is noise: the normal is 20 to 90 degrees off, and its own
+/// scatter, small both ways, does not say so (docs/results/planes.md).
 ///
 /// `radius` [m] is the one that the neighbours were gathered in. One-sidedness is measured within the plane. The part
 /// along the normal is the residual itself: counting it would throw away all planes as soon as the prediction is off by

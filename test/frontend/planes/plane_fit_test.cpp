@@ -77,7 +77,7 @@ TEST(PlaneFit, RefusesALine) {
   EXPECT_EQ(fit_plane(moments, {}).verdict, PlaneVerdict::kLine);
 }
 
-// Points of one wall in two layers of voxels: two columns of two means each, 2 cm apart by noise.
+// Four means, 12 cm long and 5 or 7 cm wide: a spread of 2.5 or 3.5 cm along the narrow side.
 TEST(PlaneFit, RefusesALineThatNoiseHasWidened) {
   FrontendConfig config;
   config.min_plane_points = 4;
