@@ -67,6 +67,7 @@ struct FrontendConfig {
   bool map_two_faces = false;
   double map_drift = 1.0;
   double wide_match_radius_m = 0.0;
+  double line_match_radius_m = 0.0;
   double imu_timeout_s = 0.5;
   double resume_max_gap_s = 3.0;
   double degraded_sigma_m = 0.15;
@@ -108,11 +109,12 @@ struct FrontendConfig {
     };
     if (!(max_range_m > min_range_m)) refuse("max_range_m", max_range_m, "more than min_range_m");
     if (!(match_radius_m >= voxel_size_m)) refuse("match_radius_m", match_radius_m, "at least voxel_size_m");
-    if (!(wide_match_radius_m == 0.0 ||
-          (wide_match_radius_m > match_radius_m && wide_match_radius_m <= 10.0 * voxel_size_m))) {
-      refuse("wide_match_radius_m", wide_match_radius_m,
-             "0, or more than match_radius_m and at most 10 x voxel_size_m");
-    }
+    const auto require_wider = [&](const char* field, double radius) {
+      if (radius == 0.0 || (radius > match_radius_m && radius <= 10.0 * voxel_size_m)) return;
+      refuse(field, radius, "0, or more than match_radius_m and at most 10 x voxel_size_m");
+    };
+    require_wider("wide_match_radius_m", wide_match_radius_m);
+    require_wider("line_match_radius_m", line_match_radius_m);
     if (!(match_radius_m <= 10.0 * voxel_size_m)) {
       refuse("match_radius_m", match_radius_m, "at most 10 x voxel_size_m (the search is over voxels)");
     }
@@ -216,6 +218,8 @@ struct FrontendConfig {
                  "factor on the variance that each scan leaves in the published covariance for good");
     visit.number("wide_match_radius_m", self.wide_match_radius_m, {0.0, 10.0}, "m",
                  "neighbour radius for points that find too few within match_radius_m; 0: none");
+    visit.number("line_match_radius_m", self.line_match_radius_m, {0.0, 10.0}, "m",
+                 "neighbour radius for points whose neighbours make a line, as a single beam's do; 0: none");
     visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",
                  "scan time without IMU data after which scans go on alone, at constant velocity");
     visit.number("resume_max_gap_s", self.resume_max_gap_s, {0.0, 3.0}, "s",

@@ -30,14 +30,19 @@ std::span<const PlaneFit> PlaneFinder::find(const LocalMap& map, std::span<const
   chosen_.clear();
   for (std::size_t i = 0; i < queries.size(); ++i) chosen_.push_back(i);
   fit_chosen(map, queries, seen_from, config_, config_.match_radius_m);
-  const double radius = config_.wide_match_radius_m;
-  if (!(radius > 0.0)) return planes_;
+  look_wider(PlaneVerdict::kTooFewPoints, config_.wide_match_radius_m, map, queries, seen_from);
+  look_wider(PlaneVerdict::kLine, config_.line_match_radius_m, map, queries, seen_from);
+  return planes_;
+}
+
+void PlaneFinder::look_wider(PlaneVerdict unfit, double radius, const LocalMap& map,
+                             std::span<const Eigen::Vector3d> queries, const Eigen::Vector3d& seen_from) {
+  if (!(radius > 0.0)) return;
   chosen_.clear();
   for (std::size_t i = 0; i < planes_.size(); ++i) {
-    if (planes_[i].verdict == PlaneVerdict::kTooFewPoints) chosen_.push_back(i);
+    if (planes_[i].verdict == unfit) chosen_.push_back(i);
   }
   fit_chosen(map, queries, seen_from, wide_config_, radius);
-  return planes_;
 }
 
 /// Planes of the chosen queries. Where one was seen from its other side, or what it is made of may be the two faces of
