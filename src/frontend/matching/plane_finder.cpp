@@ -26,23 +26,29 @@ PlaneFinder::PlaneFinder(const FrontendConfig& config) : config_(config), wide_c
 
 std::span<const PlaneFit> PlaneFinder::find(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
                                             const Eigen::Vector3d& seen_from) {
-  planes_.resize(queries.size());
-  chosen_.clear();
-  for (std::size_t i = 0; i < queries.size(); ++i) chosen_.push_back(i);
+  choose_all(queries.size());
   fit_chosen(map, queries, seen_from, config_, config_.match_radius_m);
-  look_wider(PlaneVerdict::kTooFewPoints, config_.wide_match_radius_m, map, queries, seen_from);
-  look_wider(PlaneVerdict::kLine, config_.line_match_radius_m, map, queries, seen_from);
+  const double radius = config_.wide_match_radius_m;
+  if (!(radius > 0.0)) return planes_;
+  chosen_.clear();
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    if (planes_[i].verdict == PlaneVerdict::kTooFewPoints) chosen_.push_back(i);
+  }
+  fit_chosen(map, queries, seen_from, wide_config_, radius);
   return planes_;
 }
 
-void PlaneFinder::look_wider(PlaneVerdict unfit, double radius, const LocalMap& map,
-                             std::span<const Eigen::Vector3d> queries, const Eigen::Vector3d& seen_from) {
-  if (!(radius > 0.0)) return;
+std::span<const PlaneFit> PlaneFinder::find_across_lines(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
+                                                         const Eigen::Vector3d& seen_from) {
+  choose_all(queries.size());
+  fit_chosen(map, queries, seen_from, wide_config_, config_.line_match_radius_m);
+  return planes_;
+}
+
+void PlaneFinder::choose_all(std::size_t queries) {
+  planes_.resize(queries);
   chosen_.clear();
-  for (std::size_t i = 0; i < planes_.size(); ++i) {
-    if (planes_[i].verdict == unfit) chosen_.push_back(i);
-  }
-  fit_chosen(map, queries, seen_from, wide_config_, radius);
+  for (std::size_t i = 0; i < queries; ++i) chosen_.push_back(i);
 }
 
 /// Planes of the chosen queries. Where one was seen from its other side, or what it is made of may be the two faces of

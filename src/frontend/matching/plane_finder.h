@@ -19,17 +19,17 @@ class PlaneFinder {
 
   /// One for each query [m, odom frame], as seen from a point; valid until the next call. Where the neighbourhood
   /// within match_radius_m holds too few points, the plane is sought within wide_match_radius_m: far surfaces are
-  /// sparse, and a small neighbourhood keeps edges sharp where the map is dense. Where it is a line, within
-  /// line_match_radius_m: a LiDAR of few beams draws one line on a floor, a step further the next, and until two of
-  /// them make a plane nothing holds the tilt. What tilts then widens each line to a wall that faces the sensor and
-  /// goes along with it.
+  /// sparse, and a small neighbourhood keeps edges sharp where the map is dense.
   [[nodiscard]] std::span<const PlaneFit> find(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
                                                const Eigen::Vector3d& seen_from);
+  /// The same within line_match_radius_m, for points whose near neighbours make a line: a beam draws one on a floor, a
+  /// step further the next beam another, and both together are a plane.
+  [[nodiscard]] std::span<const PlaneFit> find_across_lines(const LocalMap& map,
+                                                            std::span<const Eigen::Vector3d> queries,
+                                                            const Eigen::Vector3d& seen_from);
 
  private:
-  /// Anew, in a wider neighbourhood, those that are not a plane for this reason.
-  void look_wider(PlaneVerdict unfit, double radius, const LocalMap& map, std::span<const Eigen::Vector3d> queries,
-                  const Eigen::Vector3d& seen_from);
+  void choose_all(std::size_t queries);
   void fit_chosen(const LocalMap& map, std::span<const Eigen::Vector3d> queries, const Eigen::Vector3d& seen_from,
                   const FrontendConfig& config, double radius);
   void fit(const LocalMap& map, std::span<const Eigen::Vector3d> queries, const FrontendConfig& config, double radius,

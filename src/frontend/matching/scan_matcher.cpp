@@ -15,11 +15,9 @@
 namespace ignis {
 namespace {
 
-// Below these the next pass would change nothing that matters.
-constexpr double kConvergedPosition = 1e-4;  // m
+constexpr double kConvergedPosition = 1e-4;  // m; below these the next pass would change nothing that matters
 constexpr double kConvergedAngle = 1e-5;     // rad
-// A normal "touches" a world axis when its component exceeds this; every unit vector touches at least one.
-constexpr double kTouch = 0.5;
+constexpr double kTouch = 0.5;      // component from which a normal touches a world axis; every unit vector touches one
 constexpr int kYoungMapScans = 10;  // normals of a map of fewer scans say little about what is observed
 // A map of so many points, a second of L1 scans, adds as much to a distance as the point does. NIS of a standing L1 in
 // that second: 100 to 200 without this, 2 to 6 of 6 degrees of freedom with it.
@@ -32,6 +30,8 @@ constexpr double kKnownShift = 0.1;         // m: a direction that salient point
 constexpr double kWeakShift = 0.02;
 constexpr float kPointsOfAMean = 5.0F;       // a voxel of fewer says less about a place than its neighbourhood does
 constexpr std::size_t kPointsTogether = 64;  // so many stay in the first-level cache
+// Share of the points: with fewer at near planes nothing may hold the tilt, and what tilts makes walls of lone rings.
+constexpr double kFewPlanes = 0.1;
 constexpr auto kAll = [](const auto&) { return true; };
 
 /// A step of its own from where the iterate is; false on numerical failure.
@@ -101,25 +101,38 @@ MatchResult ScanMatcher::match(const FilterState& predicted, const Pose& T_start
   return result;
 }
 
-void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
-  constraints_.clear();
-  unmatched_.clear();
+void ScanMatcher::add_constraints(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
+                                  bool across_lines) {
+  const auto find = across_lines ? &PlaneFinder::find_across_lines : &PlaneFinder::find;
   const Eigen::Matrix3d R = pose.rotation.toRotationMatrix();
   for (std::size_t begin = 0; begin < points_body.size(); begin += kPointsTogether) {
     const auto points = points_body.subspan(begin, std::min(kPointsTogether, points_body.size() - begin));
     queries_.clear();
     for (const Eigen::Vector3f& point : points) queries_.emplace_back(R * point.cast<double>() + pose.translation);
-    const std::span<const PlaneFit> planes = plane_finder_.find(map, queries_, pose.translation);
+    const std::span<const PlaneFit> planes = (plane_finder_.*find)(map, queries_, pose.translation);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const PlaneFit& plane = planes[i];
       if (plane.verdict != PlaneVerdict::kPlane) {
-        unmatched_.push_back(points[i]);
+        const bool is_line = plane.verdict == PlaneVerdict::kLine && !across_lines && config_.line_match_radius_m > 0.0;
+        (is_line ? lines_ : unmatched_).push_back(points[i]);
         continue;
       }
       const double smoothness = plane_smoothness(plane.scatter[0], config_.smooth_plane_m);
       const double distance = distance_along(plane, smoothness, queries_[i], pose.translation, map);
       constraints_.push_back({points[i].cast<double>(), plane, distance, smoothness, smoothness, 1.0});
     }
+  }
+}
+
+void ScanMatcher::associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map) {
+  constraints_.clear();
+  unmatched_.clear();
+  lines_.clear();
+  add_constraints(pose, points_body, map, false);
+  if (static_cast<double>(constraints_.size()) < kFewPlanes * static_cast<double>(points_body.size())) {
+    add_constraints(pose, lines_, map, true);
+  } else {
+    unmatched_.insert(unmatched_.end(), lines_.begin(), lines_.end());
   }
   leave_out_moving_surfaces(map.scans());
   leave_out_new_surfaces(map.scans());

@@ -114,6 +114,10 @@ class ScanMatcher {
   /// Notes what is known without the scan.
   void expect(const FilterState& predicted, const KnownBefore& known);
   void associate(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map);
+  /// A constraint for each point that has a plane; the others are lines or unmatched. `across_lines`: among the points
+  /// that are lines, farther off.
+  void add_constraints(const Pose& pose, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
+                       bool across_lines);
   /// Where a plane lies along its normal [m]. Of a smooth one all neighbours tell. Where an edge or a corner passes for
   /// a plane, their mean is off to one side, before the edge or behind it, alike in scan after scan: the rougher the
   /// plane, the more is told by the points of the query's own voxel, which lie where the query does.
@@ -156,6 +160,7 @@ class ScanMatcher {
   PlaneFinder plane_finder_;
   std::vector<Eigen::Vector3d> queries_;  ///< [m] odom frame; of some points
   std::vector<Constraint> constraints_;
+  std::vector<Eigen::Vector3f> lines_;  ///< points whose near neighbours make a line
   std::vector<Eigen::Vector3f> unmatched_;
   DegeneracyAnalysis degeneracy_;
   BlindDirections blind_directions_;

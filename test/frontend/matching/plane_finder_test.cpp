@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/matching/plane_finder.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,17 +6,20 @@
 #include <random>
 #include <vector>
 
+#include "frontend/matching/plane_finder.h"
+#include "frontend/matching/scan_matcher.h"
+
 namespace ignis {
 namespace {
 
 constexpr double kHeight = 1.8;  // m, of a LiDAR above the floor
 
 /// Of config/spinning.json.
-FrontendConfig spinning_config(double line_radius) {
+FrontendConfig spinning_config() {
   FrontendConfig config;
   config.match_radius_m = 0.3;
   config.wide_match_radius_m = 0.6;
-  config.line_match_radius_m = line_radius;
+  config.line_match_radius_m = 1.5;
   config.min_plane_points = 5;
   config.max_curvature = 0.1;
   config.min_spread = 0.3;
@@ -52,20 +53,29 @@ LocalMap map_of_rings(const FrontendConfig& config, const std::vector<double>& b
   return map;
 }
 
-std::vector<PlaneFit> planes_along(double below_deg, const std::vector<double>& rings, double line_radius) {
-  const FrontendConfig config = spinning_config(line_radius);
-  const LocalMap map = map_of_rings(config, rings);
-  PlaneFinder finder(config);
-  std::vector<Eigen::Vector3d> queries;
-  for (int k = 0; k < 60; ++k) queries.push_back(on_floor(below_deg, 0.1 * k));
-  const auto found = finder.find(map, queries, Eigen::Vector3d::Zero());
-  return {found.begin(), found.end()};
-}
+class Rings {
+ public:
+  explicit Rings(const std::vector<double>& below_deg) : map_(map_of_rings(config_, below_deg)) {
+    for (int k = 0; k < 60; ++k) queries_.push_back(on_floor(13.0, 0.1 * k));
+  }
 
-TEST(PlaneFinder, FindsTheFloorBetweenTwoRingsThatAreALineEach) {
-  for (const PlaneFit& plane : planes_along(13.0, {15.0, 13.0}, 0.0)) EXPECT_NE(plane.verdict, PlaneVerdict::kPlane);
+  std::span<const PlaneFit> near() { return finder_.find(map_, queries_, Eigen::Vector3d::Zero()); }
+  std::span<const PlaneFit> across_lines() {
+    return finder_.find_across_lines(map_, queries_, Eigen::Vector3d::Zero());
+  }
+
+ private:
+  FrontendConfig config_ = spinning_config();
+  LocalMap map_;
+  PlaneFinder finder_{config_};
+  std::vector<Eigen::Vector3d> queries_;
+};
+
+TEST(PlaneFinder, FindsTheFloorAcrossTwoRingsThatAreALineEach) {
+  Rings rings({15.0, 13.0});
+  for (const PlaneFit& plane : rings.near()) EXPECT_NE(plane.verdict, PlaneVerdict::kPlane);
   int found = 0;
-  for (const PlaneFit& plane : planes_along(13.0, {15.0, 13.0}, 1.5)) {
+  for (const PlaneFit& plane : rings.across_lines()) {
     if (plane.verdict != PlaneVerdict::kPlane) continue;
     ++found;
     EXPECT_GT(std::abs(plane.normal.y()), std::cos(0.02));
@@ -75,7 +85,29 @@ TEST(PlaneFinder, FindsTheFloorBetweenTwoRingsThatAreALineEach) {
 }
 
 TEST(PlaneFinder, TakesOneRingForALineHoweverFarItLooks) {
-  for (const PlaneFit& plane : planes_along(13.0, {13.0}, 1.5)) EXPECT_EQ(plane.verdict, PlaneVerdict::kLine);
+  Rings ring({13.0});
+  for (const PlaneFit& plane : ring.across_lines()) EXPECT_EQ(plane.verdict, PlaneVerdict::kLine);
+}
+
+// A LiDAR of few beams that stands: the floor between its rings holds the tilt. Beside a wall that is seen everywhere
+// nothing is looked for further off.
+TEST(ScanMatcher, LooksAcrossLinesWhereFewPointsLieAtPlanes) {
+  const FrontendConfig config = spinning_config();
+  LocalMap map = map_of_rings(config, {15.0, 13.0});
+  std::vector<Eigen::Vector3f> points;
+  for (int k = 0; k < 600; ++k) points.push_back(on_floor(13.0, 0.01 * k).cast<float>());
+  ScanMatcher matcher(config);
+  EXPECT_GT(matcher.match({}, {}, points, map, {}).stats.matched, 400);
+
+  std::vector<Eigen::Vector3f> wall;
+  for (float x = -3.0F; x < 3.0F; x += 0.1F) {
+    for (float y = 0.0F; y < 6.0F; y += 0.1F) wall.emplace_back(x, y, 4.0F);
+  }
+  map.insert(wall, {}, true);
+  const int of_wall = matcher.match({}, {}, wall, map, {}).stats.matched;
+  EXPECT_GT(of_wall, 1000);
+  points.insert(points.end(), wall.begin(), wall.end());
+  EXPECT_EQ(matcher.match({}, {}, points, map, {}).stats.matched, of_wall);
 }
 
 }  // namespace
