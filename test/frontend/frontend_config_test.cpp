@@ -28,5 +28,19 @@ TEST(FrontendConfig, NamesEveryOffenceInOneMessage) {
   }
 }
 
+TEST(FrontendConfig, RefusesAWiderNeighbourhoodThatIsNoneOrThatTheSearchDoesNotReach) {
+  for (double FrontendConfig::* field : {&FrontendConfig::wide_match_radius_m, &FrontendConfig::line_match_radius_m}) {
+    FrontendConfig config;
+    for (const double accepted : {0.0, 2.0 * config.match_radius_m, 10.0 * config.voxel_size_m}) {
+      config.*field = accepted;
+      EXPECT_NO_THROW(config::require_valid(config, "frontend")) << accepted;
+    }
+    for (const double refused : {config.match_radius_m, 10.1 * config.voxel_size_m}) {
+      config.*field = refused;
+      EXPECT_THROW(config::require_valid(config, "frontend"), config::ConfigError) << refused;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ignis

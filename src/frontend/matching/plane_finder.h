@@ -23,7 +23,7 @@ class PlaneFinder {
   [[nodiscard]] std::span<const PlaneFit> find(const LocalMap& map, std::span<const Eigen::Vector3d> queries,
                                                const Eigen::Vector3d& seen_from);
   /// The same within line_match_radius_m, for points whose near neighbours make a line: a beam draws one on a floor, a
-  /// step further the next beam another, and both together are a plane.
+  /// step further the next beam another, and both together are a plane. Only where line_match_radius_m is not 0.
   [[nodiscard]] std::span<const PlaneFit> find_across_lines(const LocalMap& map,
                                                             std::span<const Eigen::Vector3d> queries,
                                                             const Eigen::Vector3d& seen_from);
