@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// L1_SCAN read straight from a log's bytes (EncodedScanAssembler) beside the way over the generated decoder
-// (ScanAssembler): whatever the parts, their order and the damage, both take the same and make the same scans. The
-// input is a list of parts, built whole from its bytes, since no fuzzer guesses counts that fit a length, then perhaps
-// damaged.
+// L1_SCAN read straight from its bytes (EncodedScanAssembler) beside the way over the generated decoder
+// (DecodedScanAssembler): whatever the parts, their order and the damage, both take the same and make the same scans.
+// The input is a list of parts, built whole from its bytes, since no fuzzer guesses counts that fit a length, then
+// perhaps damaged.
 
 #include <fuzzer/FuzzedDataProvider.h>
 
@@ -13,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "decoded_scan_assembler.h"
 #include "messages/length_check.h"
 #include "messages/sensor_messages.h"
 #include "require.h"
@@ -78,7 +79,7 @@ void require_equal(const Scan& a, const Scan& b) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   FuzzedDataProvider input(bytes, size);
   messages::EncodedScanAssembler encoded;
-  messages::ScanAssembler decoded;
+  messages::DecodedScanAssembler decoded;
   std::list<std::vector<std::byte>> parts;  // they have to outlive what waits for them
   for (int i = 0; i < kMaxParts && input.remaining_bytes() > 0; ++i) {
     std::vector<std::byte>& part = parts.emplace_back(encoded_part(input));
@@ -86,10 +87,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
     scan_t message;
     const bool taken = messages::decode_checked(part, message);
     require(taken == messages::read_scan_head(part).has_value());
-    const std::optional<Scan> from_bytes = encoded.add(part);
+    const std::optional<messages::EncodedScan> from_bytes = encoded.add(part);
     const std::optional<Scan> from_message = taken ? decoded.add(message) : std::nullopt;
     require(from_bytes.has_value() == from_message.has_value());
-    if (from_bytes) require_equal(*from_bytes, *from_message);
+    if (from_bytes) require_equal(from_bytes->read(), *from_message);
   }
   return 0;
 }

@@ -78,6 +78,7 @@ std::optional<PoseGraphSolution> solve_incrementally(const PoseGraph& graph, con
                                1e3 * times.quantile(0.99), 1e3 * times.quantile(1.0), settling.seconds(),
                                words_of(solution.start), runtime::stop_requested() ? ", interrupted" : ""))
             << std::flush;
+  if (!solution.given_up.empty()) std::cout << std::format("  further starts failed: {}\n", solution.given_up);
   return solution;
 }
 

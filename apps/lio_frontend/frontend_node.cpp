@@ -37,15 +37,16 @@ FrontendNode::FrontendNode(const runtime::Application& application, const std::f
     : config_(application.config),
       config_hash_(application.config_hash),
       link_(application),
-      lio_(config_.frontend.filter) {
+      lio_(config_.frontend.filter),
+      backlog_(config_.lcm.scan_backlog_s) {
   if (!checkpoint_folder.empty()) {
     checkpoints_ = std::make_unique<CheckpointFolder>(checkpoint_folder);
     resume();
   }
   imu_counts_ = &link_.subscribe<imu_t>(channels::kImu, config_.lcm.imu_queue,
                                         [this](const imu_t& message) { return on_imu(message); });
-  scan_counts_ = &link_.subscribe<scan_t>(channels::kScan, config_.lcm.scan_queue,
-                                          [this](const scan_t& part) { on_scan_part(part); });
+  scan_counts_ = &link_.subscribe<messages::ScanPart>(channels::kScan, config_.lcm.scan_queue,
+                                                      [this](const messages::ScanPart& part) { on_scan_part(part); });
   request_counts_ = &link_.subscribe<keyframe_request_t>(
       channels::kKeyframeRequest, kRequestQueue, [this](const keyframe_request_t& request) { on_request(request); },
       runtime::Senders::kSeveral);
@@ -107,13 +108,23 @@ const char* FrontendNode::on_imu(const imu_t& message) {
   return "";
 }
 
-void FrontendNode::on_scan_part(const scan_t& part) {
+void FrontendNode::on_scan_part(const messages::ScanPart& part) {
   data_heard_ = std::chrono::steady_clock::now();
-  std::optional<Scan> scan = assembler_.add(part);
-  scan_counts_->queue_drops = assembler_.incomplete();
-  if (!scan) return;
+  const auto kept = std::make_shared<const std::vector<std::byte>>(part.data.begin(), part.data.end());
+  const std::optional<messages::EncodedScan> scan = assembler_.add(*kept, kept);
+  if (scan) handle(*scan, static_cast<double>(scan_counts_->waiting) / part.part_count);
+  scan_counts_->queue_drops = assembler_.incomplete() + backlog_.left_out();
+}
+
+/// Points are read of those scans only that are used: a computer that is behind has no time for the others.
+void FrontendNode::handle(const messages::EncodedScan& scan, double scans_waiting) {
   ++scans_heard_;
-  const auto [results, milliseconds] = timed([&] { return lio_.add_scan(std::move(*scan)); });
+  const Scan frame = scan.read_frame();
+  if (backlog_.leaves_out(frame.end_utime(), scans_waiting)) {
+    publish_scan(lio_.refuse(frame, ScanReason::kBehind), 0.0);
+    return;
+  }
+  const auto [results, milliseconds] = timed([&] { return lio_.add_scan(scan.read()); });
   publish(results, milliseconds);
 }
 
@@ -216,7 +227,8 @@ void FrontendNode::tell_losses(LioStatus& status) {
   const double now_s = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   imu_losses_.look(now_s, imu_counts_->fresh, imu_counts_->lost);
   scan_losses_.look(now_s, scans_heard_, scan_counts_->lost + assembler_.incomplete());
-  for (const std::string& trouble : {imu_losses_.trouble(), scan_losses_.trouble()}) {
+  const std::string haste = backlog_.is_behind() ? "scans are left out, more come than this computer has time for" : "";
+  for (const std::string& trouble : {imu_losses_.trouble(), scan_losses_.trouble(), haste}) {
     if (trouble.empty()) continue;
     status.reason = status.trust == Trust::kOk ? trouble : status.reason + "; " + trouble;
     status.trust = std::max(status.trust, Trust::kDegraded);

@@ -18,6 +18,7 @@
 #include "runtime/channels.h"
 #include "runtime/lcm_link.h"
 #include "runtime/rate_limit.h"
+#include "scan_backlog.h"
 #include "sent_clouds.h"
 #include "sent_keyframes.h"
 #include "state_order.h"
@@ -36,7 +37,8 @@ class FrontendNode {
 
  private:
   const char* on_imu(const imu_t& message);
-  void on_scan_part(const scan_t& part);
+  void on_scan_part(const messages::ScanPart& part);
+  void handle(const messages::EncodedScan& scan, double scans_waiting);
   void on_request(const keyframe_request_t& request);
   void on_cloud_request(const keyframe_request_t& request);
   [[nodiscard]] std::optional<std::size_t> resend_keyframe(std::int32_t session, std::int32_t id);
@@ -60,7 +62,8 @@ class FrontendNode {
   runtime::ReceiverCounts* request_counts_ = nullptr;
   runtime::ReceiverCounts* cloud_request_counts_ = nullptr;
   Lio lio_;
-  messages::ScanAssembler assembler_;
+  messages::EncodedScanAssembler assembler_;
+  ScanBacklog backlog_;
   std::int64_t scans_heard_ = 0;  // whole ones
   LossWatch imu_losses_{runtime::channels::kImu};
   LossWatch scan_losses_{runtime::channels::kScan};

@@ -182,7 +182,7 @@ void ReplayInput::run(const Handlers& handlers) const {
     imu_t imu;
     lio_command_t command;
     if (entry.kind == Kind::kScan) {
-      if (std::optional<Scan> scan = assembler.add(entry.data)) handlers.on_scan(*std::move(scan));
+      if (const auto scan = assembler.add(entry.data)) handlers.on_scan(scan->read());
     } else if (entry.kind == Kind::kCommand && messages::decode_checked(entry.data, command)) {
       handlers.on_command(command);
     } else if (messages::decode_checked(entry.data, imu)) {

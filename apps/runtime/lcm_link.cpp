@@ -56,6 +56,7 @@ void LcmLink::subscribe_raw(Receiver& receiver, int queue_capacity) {
   if (subscription == nullptr) throw UserError(std::format("cannot subscribe to {}", receiver.counts.channel), kFailed);
   subscription->setQueueCapacity(queue_capacity);
   receiver.link = this;
+  receiver.subscription = subscription;
   // LCM opens its socket at the first subscription.
   if (address_ && !socket_) guard_socket();
 }
@@ -76,6 +77,7 @@ void LcmLink::on_message(const lcm::ReceiveBuffer* buffer, const std::string&, R
     link.refuse(*receiver, "a datagram without a body", false);
     return;
   }
+  receiver->counts.waiting = receiver->subscription->getQueueSize();
   link.take({static_cast<const std::byte*>(buffer->data), buffer->data_size}, *receiver);
   // LCM's receiving thread stamps with the system's clock, so this compares with it.
   link.budget_.add_latency(1e-3 * static_cast<double>(system_utime() - buffer->recv_utime));

@@ -38,6 +38,7 @@ struct ReceiverCounts {
   std::int64_t lost = 0;         ///< by the sender's running number, and scans or keyframes with a part missing
   std::int64_t rejected = 0;     ///< wrong type, or a length that contradicts the counts inside
   std::int64_t queue_drops = 0;  ///< skipped by this process because it was late
+  std::int64_t waiting = 0;      ///< behind the message at hand; for handlers
 };
 
 /// Whether the running numbers of a channel can be checked: several senders share HEALTH, requests and commands.
@@ -119,6 +120,7 @@ class LcmLink {
     std::int64_t type = 0;                                           ///< fingerprint of the messages that belong here
     std::function<const char*(std::span<const std::byte>)> deliver;  ///< why it was refused; empty when it was not
     LcmLink* link = nullptr;
+    lcm::Subscription* subscription = nullptr;
   };
 
   void subscribe_raw(Receiver& receiver, int queue_capacity);

@@ -26,10 +26,6 @@ void define_position(ErrorCovariance& covariance) {
   covariance.diagonal().segment<3>(kPosition).setConstant(kVariance);
 }
 
-double velocity_sigma(const FilterState& filter) {
-  return std::sqrt(filter.covariance.diagonal().segment<3>(kVelocity).maxCoeff());
-}
-
 }  // namespace
 
 const char* Lio::begin_anew_after(Utime utime, std::int32_t session) {
@@ -181,7 +177,8 @@ void Lio::follow_moving_start(ScanReason reason) {
   if (reason == ScanReason::kApplied) {
     // The map holds scans that were deskewed without a velocity: begin it anew with this scan, deskewed properly.
     map_.clear();
-    velocity_known_ = applied_scans_ >= kScansOfMovingStart && velocity_sigma(filter_) < config_.velocity_known_sigma;
+    velocity_known_ = applied_scans_ >= kScansOfMovingStart &&
+                      largest_axis_sigma(filter_.covariance, kVelocity) < config_.velocity_known_sigma;
   } else if (is_contradiction(reason)) {
     map_.clear();
   }

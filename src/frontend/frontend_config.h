@@ -218,8 +218,9 @@ struct FrontendConfig {
                  "factor on the variance that each scan leaves in the published covariance for good");
     visit.number("wide_match_radius_m", self.wide_match_radius_m, {0.0, 10.0}, "m",
                  "neighbour radius for points that find too few within match_radius_m; 0: none");
-    visit.number("line_match_radius_m", self.line_match_radius_m, {0.0, 10.0}, "m",
-                 "neighbour radius for points whose neighbours make a line, as a single beam's do; 0: none");
+    visit.number(
+        "line_match_radius_m", self.line_match_radius_m, {0.0, 10.0}, "m",
+        "neighbour radius for points on lines, as single beams draw, while fewer than a tenth of a scan finds planes");
     visit.number("imu_timeout_s", self.imu_timeout_s, {0.05, 10.0}, "s",
                  "scan time without IMU data after which scans go on alone, at constant velocity");
     visit.number("resume_max_gap_s", self.resume_max_gap_s, {0.0, 3.0}, "s",

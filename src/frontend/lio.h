@@ -66,6 +66,9 @@ class Lio {
   [[nodiscard]] ImuResult add_imu(const ImuSample& sample);
   [[nodiscard]] std::vector<ScanResult> add_scan(Scan scan);
 
+  /// What is told of a scan that is not used, or, with kBehind, that the caller leaves out.
+  [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
+
   /// Forgets everything and starts a new session.
   void reset();
 
@@ -100,7 +103,6 @@ class Lio {
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult result_of(const Scan& scan, const MatchResult& match, std::vector<CloudPoint> cloud,
                                      std::vector<CloudPoint> sparse);
-  [[nodiscard]] ScanResult refuse(const Scan& scan, ScanReason reason) const;
   void forget_old_samples();
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,

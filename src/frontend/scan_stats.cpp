@@ -35,6 +35,8 @@ std::string_view text(ScanReason reason) {
       return "overlaps the scan before it, or came too soon after it";
     case ScanReason::kSessionEnded:
       return "its session was ended by a command";
+    case ScanReason::kBehind:
+      return "left out: more scans come than this computer has time for";
   }
   return "unknown reason";
 }

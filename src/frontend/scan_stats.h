@@ -29,6 +29,7 @@ enum class ScanReason : std::int8_t {
   kNumericalFailure = 12,
   kTooOften = 13,
   kSessionEnded = 14,
+  kBehind = 15,
 };
 
 /// The reason in words.

@@ -127,13 +127,17 @@ template <class Message>
          length_is_consistent(kLayout<Message>, data.subspan(kFingerprintBytes));
 }
 
-/// Decodes a whole message. False: another type, another version, a body whose length contradicts its counts, or a
-/// stamp that no clock shows.
+/// Decodes a whole message, or lets it read itself if it can. False: another type, another version, a body whose length
+/// contradicts its counts, or a stamp that no clock shows.
 template <class Message>
 [[nodiscard]] bool decode_checked(std::span<const std::byte> data, Message& message) {
-  if (!is_whole<Message>(data)) return false;
-  const int size = static_cast<int>(data.size());
-  return message.decode(data.data(), 0, size) == size && stamps_are_possible(message);
+  if constexpr (requires { message.read(data); }) {
+    return message.read(data);
+  } else {
+    if (!is_whole<Message>(data)) return false;
+    const int size = static_cast<int>(data.size());
+    return message.decode(data.data(), 0, size) == size && stamps_are_possible(message);
+  }
 }
 
 }  // namespace ignis::messages

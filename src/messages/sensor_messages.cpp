@@ -108,47 +108,50 @@ std::optional<ScanHead> read_scan_head(std::span<const std::byte> data) {
   return head;
 }
 
-std::optional<Scan> EncodedScanAssembler::add(std::span<const std::byte> data) {
-  const std::optional<ScanHead> head = read_scan_head(data);
-  if (!head) return std::nullopt;
-  const auto parts = parts_.add({head->sequence, head->part, head->part_count, data.subspan(kFingerprintBytes)});
-  if (!parts) return std::nullopt;
-  const unsigned char* first = bytes_of(parts->front().body);
-  Scan scan{.utime = load_big_s64(first),
-            .sequence = load_big_s32(first + kSequenceAt),
-            .duration_us = load_big_s32(first + kDurationAt),
-            .missing_packets = load_big_s32(first + kMissingPacketsAt),
-            .points = {}};
+bool ScanPart::read(std::span<const std::byte> from) {
+  const std::optional<ScanHead> head = read_scan_head(from);
+  if (!head) return false;
+  static_cast<ScanHead&>(*this) = *head;
+  data = from;
+  return true;
+}
+
+Scan EncodedScan::read_frame() const {
+  const unsigned char* first = bytes_of(bodies_.front());
+  return {.utime = load_big_s64(first),
+          .sequence = load_big_s32(first + kSequenceAt),
+          .duration_us = load_big_s32(first + kDurationAt),
+          .missing_packets = load_big_s32(first + kMissingPacketsAt),
+          .points = {}};
+}
+
+Scan EncodedScan::read() const {
+  Scan scan = read_frame();
   std::size_t total = 0;
-  for (const Part& part : *parts) total += point_count(part.body);
+  for (const auto& body : bodies_) total += point_count(body);
   scan.points.resize(total);
   std::size_t filled = 0;
-  for (const Part& part : *parts) {
-    read_points(part.body, scan.points.data() + filled);
-    filled += point_count(part.body);
+  for (const auto& body : bodies_) {
+    read_points(body, scan.points.data() + filled);
+    filled += point_count(body);
   }
   return scan;
 }
 
-std::optional<Scan> ScanAssembler::add(const scan_t& part) {
-  const std::optional<std::vector<scan_t>> parts = parts_.add(part);
+std::optional<EncodedScan> EncodedScanAssembler::add(std::span<const std::byte> data,
+                                                     std::shared_ptr<const void> owner) {
+  const std::optional<ScanHead> head = read_scan_head(data);
+  if (!head) return std::nullopt;
+  auto parts =
+      parts_.add({head->sequence, head->part, head->part_count, data.subspan(kFingerprintBytes), std::move(owner)});
   if (!parts) return std::nullopt;
-  const scan_t& first = parts->front();
-  std::size_t total = 0;
-  for (const scan_t& each : *parts) total += each.x.size();
-  Scan scan{.utime = first.utime,
-            .sequence = first.sequence,
-            .duration_us = first.duration_us,
-            .missing_packets = first.missing_packets,
-            .points = {}};
-  scan.points.reserve(total);
-  for (const scan_t& each : *parts) {
-    for (std::size_t i = 0; i < each.x.size(); ++i) {
-      scan.points.push_back(
-          {.position = {each.x[i], each.y[i], each.z[i]}, .intensity = each.intensity[i], .dt_us = each.dt_us[i]});
-    }
+  EncodedScan::Bodies bodies;
+  std::vector<std::shared_ptr<const void>> owners;
+  for (Part& part : *parts) {
+    bodies.push_back(part.body);
+    if (part.owner) owners.push_back(std::move(part.owner));
   }
-  return scan;
+  return EncodedScan(std::move(bodies), std::move(owners));
 }
 
 }  // namespace ignis::messages

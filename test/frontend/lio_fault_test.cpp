@@ -145,6 +145,24 @@ TEST(Fault_F7, ScansTenTimesTooOftenAreRefusedByNameAndTheOthersKeepThePose) {
   EXPECT_LT(run.error_at_end(), 0.2);
 }
 
+TEST(Fault_B3, ThePoseIsHeldByEveryFifthScanAndTheOthersHaveTheirVerdict) {
+  Drive input = drive();
+  std::vector<Scan> kept;
+  std::vector<Scan> left_out;
+  for (const Scan& scan : input.scans) (kept.size() < 60 || scan.sequence % 5 == 0 ? kept : left_out).push_back(scan);
+  ASSERT_GT(left_out.size(), 100U);
+  input.scans = kept;
+  const Watched run(input);
+  EXPECT_EQ(run.trust.back().second, Trust::kOk);
+  EXPECT_EQ(run.lio.session(), 0);
+  EXPECT_NEAR(run.error_at_end(), Watched(drive()).error_at_end(), 0.02) << "no worse than with all scans";
+  const ScanResult verdict = run.lio.refuse(left_out.back(), ScanReason::kBehind);
+  EXPECT_EQ(verdict.stats.utime, left_out.back().end_utime());
+  EXPECT_EQ(verdict.stats.scan_sequence, left_out.back().sequence);
+  EXPECT_FALSE(verdict.has_state || verdict.stats.applied());
+  EXPECT_NE(explanation(verdict.stats).find("left out"), std::string::npos) << explanation(verdict.stats);
+}
+
 TEST(Fault_F8, PointTimesThatAreUnsortedOrOutsideTheScanAreClamped) {
   Drive input = drive();
   for (std::size_t i = 100; i < input.scans.size(); ++i) {

@@ -352,7 +352,8 @@ TEST(ScanStats, ReasonsEqualTheConstantsOfTheMessage) {
       {"NO_IMU", ScanReason::kNoImu},
       {"NUMERICAL_FAILURE", ScanReason::kNumericalFailure},
       {"TOO_OFTEN", ScanReason::kTooOften},
-      {"SESSION_ENDED", ScanReason::kSessionEnded}};
+      {"SESSION_ENDED", ScanReason::kSessionEnded},
+      {"BEHIND", ScanReason::kBehind}};
   for (const auto& [name, reason] : expected) {
     EXPECT_NE(lcm.find(" " + name + " = " + std::to_string(static_cast<int>(reason))), std::string::npos) << name;
     EXPECT_NE(text(reason), "unknown reason");

@@ -2,9 +2,13 @@
 #include "messages/sensor_messages.h"
 
 #include <limits>
+#include <memory>
 #include <ranges>
 
 #include <gtest/gtest.h>
+
+#include "decoded_scan_assembler.h"
+#include "messages/length_check.h"
 
 namespace ignis::messages {
 namespace {
@@ -61,7 +65,7 @@ class ScanParts : public testing::TestWithParam<std::int32_t> {};
 
 TEST_P(ScanParts, FitOneDatagramEachAndComeTogetherAgain) {
   const Scan scan = scan_of(GetParam());
-  ScanAssembler assembler;
+  DecodedScanAssembler assembler;
   std::optional<Scan> back;
   for (const scan_t& part : to_messages(scan)) {
     EXPECT_LE(part.getEncodedSize(), 64'000);
@@ -82,30 +86,61 @@ TEST_P(ScanParts, FitOneDatagramEachAndComeTogetherAgain) {
 
 TEST_P(ScanParts, ReadFromTheirBytesAreTheDecodedOnesInAnyOrder) {
   std::vector<std::vector<std::byte>> bytes;
-  ScanAssembler decoding;
+  DecodedScanAssembler decoding;
   std::optional<Scan> decoded;
   for (const scan_t& part : to_messages(scan_of(GetParam()))) {
     bytes.push_back(encoded(part));
     decoded = decoding.add(part);
   }
   EncodedScanAssembler assembler;
-  std::optional<Scan> scan;
+  std::optional<EncodedScan> whole;
   for (const std::vector<std::byte>& each : bytes | std::views::reverse) {
-    ASSERT_FALSE(scan);
+    ASSERT_FALSE(whole);
     ASSERT_FALSE(assembler.add(std::span(each).first(each.size() - 1))) << "a damaged part is none";
-    scan = assembler.add(each);
+    whole = assembler.add(each);
   }
-  ASSERT_TRUE(scan && decoded);
-  EXPECT_EQ(scan->utime, decoded->utime);
-  EXPECT_EQ(scan->sequence, decoded->sequence);
-  EXPECT_EQ(scan->duration_us, decoded->duration_us);
-  EXPECT_EQ(scan->missing_packets, decoded->missing_packets);
-  ASSERT_EQ(scan->points.size(), decoded->points.size());
-  for (std::size_t i = 0; i < scan->points.size(); ++i) {
-    ASSERT_EQ(scan->points[i].position, decoded->points[i].position);
-    ASSERT_EQ(scan->points[i].intensity, decoded->points[i].intensity);
-    ASSERT_EQ(scan->points[i].dt_us, decoded->points[i].dt_us);
+  ASSERT_TRUE(whole && decoded);
+  const Scan frame = whole->read_frame();
+  EXPECT_EQ(frame.end_utime(), decoded->end_utime());
+  EXPECT_EQ(frame.sequence, decoded->sequence);
+  EXPECT_TRUE(frame.points.empty());
+  const Scan scan = whole->read();
+  EXPECT_EQ(scan.utime, decoded->utime);
+  EXPECT_EQ(scan.sequence, decoded->sequence);
+  EXPECT_EQ(scan.duration_us, decoded->duration_us);
+  EXPECT_EQ(scan.missing_packets, decoded->missing_packets);
+  ASSERT_EQ(scan.points.size(), decoded->points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    ASSERT_EQ(scan.points[i].position, decoded->points[i].position);
+    ASSERT_EQ(scan.points[i].intensity, decoded->points[i].intensity);
+    ASSERT_EQ(scan.points[i].dt_us, decoded->points[i].dt_us);
   }
+}
+
+TEST(SensorMessages, BytesOfAScanAreKeptByTheirOwnersAndOnlyAsLongAsTheyAreNeeded) {
+  const std::vector<scan_t> parts = to_messages(scan_of(7'000));
+  EncodedScanAssembler assembler;
+  std::vector<std::weak_ptr<const std::vector<std::byte>>> kept;
+  std::optional<EncodedScan> whole;
+  for (const scan_t& part : parts) {
+    const auto bytes = std::make_shared<const std::vector<std::byte>>(encoded(part));
+    kept.push_back(bytes);
+    whole = assembler.add(*bytes, bytes);
+  }
+  ASSERT_TRUE(whole);
+  for (const auto& each : kept) EXPECT_FALSE(each.expired());
+  EXPECT_EQ(whole->read().points.size(), 7'000U);
+  whole.reset();
+  for (const auto& each : kept) EXPECT_TRUE(each.expired());
+}
+
+TEST(SensorMessages, APartThatIsReadFromTheBusIsRefusedAsItsMessageIs) {
+  const std::vector<std::byte> data = encoded(to_messages(scan_of(5)).front());
+  ScanPart part;
+  ASSERT_TRUE(decode_checked(data, part));
+  EXPECT_EQ(part.part_count, 1);
+  EXPECT_EQ(part.data.size(), data.size());
+  EXPECT_FALSE(decode_checked(std::span(data).first(data.size() - 1), part));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, ScanParts, testing::Values(0, 1, 1080, 2900, 2901, 120'000));

@@ -163,18 +163,28 @@ PoseGraphSolution PoseGraphOptimiser::finish(const SettlingObserver& observer) {
   for (KeyframePose& vertex : start.vertices) vertex.T_map_body = pose(vertex.id);
   // Linearisation points may still lie within the solver's thresholds of where they should be.
   PoseGraphSolution best = settled(start, PoseGraphStart::kPoseByPose, observer);
+  try {
+    try_further_starts(best, observer);
+  } catch (const std::exception& error) {
+    best.given_up = error.what();
+  }
+  return best;
+}
+
+/// Leaves the solution of lowest cost in `best`, whatever ends the work.
+void PoseGraphOptimiser::try_further_starts(PoseGraphSolution& best, const SettlingObserver& observer) const {
+  PoseGraph start = graph_;
   start.vertices = chordal_start(graph_);
-  if (start.vertices.empty() || !observer(PoseGraphStart::kChordalRelaxation)) return best;
+  if (start.vertices.empty() || !observer(PoseGraphStart::kChordalRelaxation)) return;
   PoseGraphSolution relaxed = settled(start, PoseGraphStart::kChordalRelaxation, observer);
   const std::size_t edges = graph_.edges.size();
-  if (!is_lower(best, relaxed, edges) && !is_lower(relaxed, best, edges)) return best;
+  if (!is_lower(best, relaxed, edges) && !is_lower(relaxed, best, edges)) return;
   if (is_lower(relaxed, best, edges)) best = std::move(relaxed);
   const auto goes_on = [&] { return observer(PoseGraphStart::kLiftedDescent); };
   start.vertices = lifted_start(graph_, start.vertices, goes_on);
-  if (start.vertices.empty()) return best;
+  if (start.vertices.empty()) return;
   PoseGraphSolution lifted = settled(start, PoseGraphStart::kLiftedDescent, observer);
   if (is_lower(lifted, best, edges)) best = std::move(lifted);
-  return best;
 }
 
 PoseGraphSolution optimise_pose_graph(const PoseGraph& graph, const SolverConfig& config) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <string_view>
 #include <unordered_map>
 #include <vector>
@@ -23,6 +24,7 @@ struct PoseGraphSolution {
   std::vector<KeyframePose> poses;  ///< in the order of the graph's vertices
   double half_chi_square = 0.0;     ///< of the edges alone
   PoseGraphStart start = PoseGraphStart::kStoredPoses;
+  std::string given_up;  ///< why further starts were not tried to their end, such as want of memory; empty: they were
 };
 
 /// Told again and again which start is being worked from; false ends the work there, and the lowest cost so far stands.
@@ -47,7 +49,7 @@ class PoseGraphOptimiser {
   /// Settles the whole graph: updates without news, then batch steps from where they end, as the back end swaps in its
   /// batch optimum. Where edges err by a tenth of a radian and more, pose by pose may have led into a wrong minimum;
   /// so batch steps from the chordal relaxation are tried as well, and where these end elsewhere, others from the
-  /// lifted descent. The lowest cost stands. Requires complete().
+  /// lifted descent. The lowest cost stands, also when a further start fails. Requires complete().
   [[nodiscard]] PoseGraphSolution finish(const SettlingObserver& observer);
 
  private:
@@ -60,6 +62,7 @@ class PoseGraphOptimiser {
   [[nodiscard]] static std::vector<Entry> entry_order(const PoseGraph& graph);
 
   [[nodiscard]] Pose pose(std::int32_t id);
+  void try_further_starts(PoseGraphSolution& best, const SettlingObserver& observer) const;
 
   const PoseGraph& graph_;
   PoseGraphVariables variables_;

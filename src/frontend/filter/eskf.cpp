@@ -139,6 +139,10 @@ Eigen::Matrix3d rest_acceleration_covariance(const FilterState& filter, double g
   return J * filter.covariance * J.transpose();
 }
 
+double largest_axis_sigma(const ErrorCovariance& covariance, ErrorBlock block) {
+  return std::sqrt(covariance.diagonal().segment<3>(block).maxCoeff());
+}
+
 bool make_symmetric(ErrorCovariance& covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
   return covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0;

@@ -75,6 +75,9 @@ void predict(FilterState& filter, const InertialInput& input, double dt, const F
 /// tilt of gravity together, of which each alone may be far less certain.
 [[nodiscard]] Eigen::Matrix3d rest_acceleration_covariance(const FilterState& filter, double gravity);
 
+/// The largest standard deviation of a block's three axes.
+[[nodiscard]] double largest_axis_sigma(const ErrorCovariance& covariance, ErrorBlock block);
+
 /// Makes a covariance exactly symmetric. Returns false when it is not finite or a variance is not positive.
 [[nodiscard]] bool make_symmetric(ErrorCovariance& covariance);
 

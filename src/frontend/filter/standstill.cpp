@@ -49,10 +49,6 @@ Quiet summarise(std::span<const ImuSample> window) {
   return quiet;
 }
 
-double largest_sigma(const ErrorCovariance& covariance, ErrorBlock block) {
-  return std::sqrt(covariance.diagonal().segment<3>(block).maxCoeff());
-}
-
 /// Velocity before the newest samples, by integration back over them, attitude and biases held; mean turn rate of the
 /// samples before those.
 Standstill measure(std::span<const ImuSample> before, std::span<const ImuSample> newest, const FilterState& filter,
@@ -101,7 +97,7 @@ bool sets_off(std::span<const ImuSample> samples, const FilterState& filter, con
 /// After a drive: two sigma more would still be hardly a motion. What was felt when it set off may by chance come to
 /// little while the vehicle goes on, and where scans do not see the way nothing puts a wrong zero right.
 bool hardly_moves(const FilterState& filter, const FrontendConfig& config) {
-  const double sigma = largest_sigma(filter.covariance, kVelocity);
+  const double sigma = largest_axis_sigma(filter.covariance, kVelocity);
   return !must_move(filter, config) &&
          filter.nominal.v_odom.norm() + kSigmasToBelieve * sigma <= kHardlyMoving * config.stationary_speed;
 }
@@ -109,11 +105,11 @@ bool hardly_moves(const FilterState& filter, const FrontendConfig& config) {
 }  // namespace
 
 bool must_move(const FilterState& filter, const FrontendConfig& config, double sigmas) {
-  const double sigma = largest_sigma(filter.covariance, kVelocity);
+  const double sigma = largest_axis_sigma(filter.covariance, kVelocity);
   return filter.nominal.v_odom.norm() > config.stationary_speed + sigmas * sigma;
 }
 
-bool may_move(const FilterState& filter) { return largest_sigma(filter.covariance, kVelocity) > kVagueVelocity; }
+bool may_move(const FilterState& filter) { return largest_axis_sigma(filter.covariance, kVelocity) > kVagueVelocity; }
 
 std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, const FilterState& filter,
                                           const FrontendConfig& config, Unless unless) {
@@ -129,8 +125,8 @@ std::optional<Standstill> find_standstill(std::span<const ImuSample> samples, co
 
   const Quiet quiet = summarise(window);
   const double seconds = 1e-6 * static_cast<double>(kStandstillWindowUs);
-  const double gyro_limit =
-      kStandstillSigmas * (config.imu_noise_gyro / std::sqrt(seconds) + largest_sigma(filter.covariance, kGyroBias));
+  const double gyro_limit = kStandstillSigmas * (config.imu_noise_gyro / std::sqrt(seconds) +
+                                                 largest_axis_sigma(filter.covariance, kGyroBias));
   // The noise of a mean over half the window, twice: the difference of two such means.
   const double drift_limit = kStandstillSigmas * config.imu_noise_accel * std::sqrt(4.0 / seconds);
   const bool still = quiet.gyro_sigma <= config.rest_gyro_sigma && quiet.accel_sigma <= config.rest_accel_sigma &&

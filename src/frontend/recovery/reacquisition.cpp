@@ -51,10 +51,6 @@ Points some_of(std::span<const Eigen::Vector3f> points, std::size_t most) {
   return some;
 }
 
-double largest_position_sigma(const ErrorCovariance& covariance) {
-  return std::sqrt(covariance.diagonal().segment<3>(kPosition).maxCoeff());
-}
-
 double bell(double sigmas) { return std::exp(-0.5 * sigmas * sigmas); }
 
 struct Hypothesis {
@@ -92,7 +88,7 @@ class PlaceJudge {
 
   /// From the prediction on.
   [[nodiscard]] NavState approached(const Points& points) const {
-    const double sigma = largest_position_sigma(predicted_.covariance);
+    const double sigma = largest_axis_sigma(predicted_.covariance, kPosition);
     const double radius = std::min(kPlaceSigmas * sigma, kLargestRadiusVoxels * config_.voxel_size_m);
     return refined(predicted_.nominal, points, radius);
   }
@@ -220,7 +216,7 @@ Pose approached(const FilterState& predicted, std::span<const Eigen::Vector3f> p
 Reacquisition reacquire(const FilterState& predicted, std::span<const Eigen::Vector3f> points_body, const LocalMap& map,
                         const FrontendConfig& config) {
   const PlaceJudge judge(predicted, points_body, map, config);
-  const double reach = kPlaceSigmas * largest_position_sigma(predicted.covariance);
+  const double reach = kPlaceSigmas * largest_axis_sigma(predicted.covariance, kPosition);
   if (points_body.empty() || !predicted.covariance.allFinite() || reach <= judge.finest()) {
     return {.T_odom_body = predicted.nominal.T_odom_body, .doubtful = {}, .doubt = {}};
   }

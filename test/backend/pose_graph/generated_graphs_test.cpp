@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <new>
 #include <numbers>
 #include <ostream>
 #include <random>
@@ -178,6 +179,27 @@ TEST(PoseGraphOptimiser, LeavesTheWrongMinimaOfVagueHeadingsByTheLiftedDescent) 
   RecordProperty("half_chi_square", std::to_string(solution.half_chi_square));
   EXPECT_EQ(solution.start, PoseGraphStart::kLiftedDescent) << words_of(solution.start);
   EXPECT_LT(solution.half_chi_square, 1.001 * optimum);
+}
+
+TEST(PoseGraphOptimiser, KeepsWhatItFoundWhenAFurtherStartFails) {
+  const PoseGraph graph = without_poses(measured({"", manhattan_of_few_loops, 0.1, 0.25, true}, 3));
+  const auto solve_until = [&graph](PoseGraphStart failing) {
+    PoseGraphOptimiser optimiser(graph, config_for_files());
+    while (!optimiser.complete()) optimiser.add_next();
+    return optimiser.finish([failing](PoseGraphStart start) {
+      if (start == failing) throw std::bad_alloc();
+      return true;
+    });
+  };
+  const PoseGraphSolution first = solve_until(PoseGraphStart::kChordalRelaxation);
+  EXPECT_EQ(first.start, PoseGraphStart::kPoseByPose);
+  EXPECT_EQ(first.given_up, std::bad_alloc().what());
+  EXPECT_EQ(first.poses.size(), graph.vertices.size());
+  const PoseGraphSolution second = solve_until(PoseGraphStart::kLiftedDescent);
+  EXPECT_EQ(second.start, PoseGraphStart::kChordalRelaxation);
+  EXPECT_EQ(second.given_up, std::bad_alloc().what());
+  EXPECT_LT(second.half_chi_square, first.half_chi_square);
+  EXPECT_EQ(solve_until(PoseGraphStart::kStoredPoses).given_up, "");
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeded, GeneratedGraph,
