@@ -120,7 +120,7 @@ void FrontendNode::on_scan_part(const messages::ScanPart& part) {
 void FrontendNode::handle(const messages::EncodedScan& scan, double scans_waiting) {
   ++scans_heard_;
   const Scan frame = scan.read_frame();
-  if (backlog_.leaves_out(frame.end_utime(), scans_waiting)) {
+  if (backlog_.leaves_out(frame, scans_waiting)) {
     publish_scan(lio_.refuse(frame, ScanReason::kBehind), 0.0);
     return;
   }

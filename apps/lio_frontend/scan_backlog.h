@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "common/measurements.h"
 #include "common/time.h"
 
 namespace ignis {
@@ -17,22 +18,22 @@ class ScanBacklog {
   /// `most_s`: how much may wait [s] before the computer counts as behind.
   explicit ScanBacklog(double most_s) : most_s_(most_s) {}
 
-  /// Whether to leave out the scan that ends at `end` [us], with `waiting` scans behind it.
-  [[nodiscard]] bool leaves_out(Utime end, double waiting) {
-    note_period(end);
-    const double waiting_s = waiting * period_s_;
-    if (!is_behind_ && waiting_s > most_s_) {
+  /// Whether to leave out a scan, of which the points do not matter, with `waiting` scans behind it.
+  [[nodiscard]] bool leaves_out(const Scan& scan, double waiting) {
+    const double waiting_s = waiting * period_s(scan);
+    if (is_near_ && waiting_s > most_s_) {
       is_behind_ = true;
+      is_near_ = false;
       waited_ = waiting;
       catching_up_ = kLongestCatchUp * static_cast<std::int64_t>(waiting);
-      last_left_out_ = end;
+      last_left_out_ = scan.end_utime();
     }
-    last_left_out_ = std::min(last_left_out_, end);  // the sensor's clock may be set back
-    if (is_behind_ && end - last_left_out_ > kCalm) is_behind_ = false;
-    if (waiting_s <= kFew_s) catching_up_ = 0;
+    last_left_out_ = std::min(last_left_out_, scan.end_utime());  // the sensor's clock may be set back
+    if (scan.end_utime() - last_left_out_ > kCalm) is_behind_ = false;
+    is_near_ = is_near_ || waiting_s <= kFew_s;
     if (!is_behind_ || waiting_s <= kFew_s) return false;
     if (catching_up_ > 0 && --catching_up_ % kKeptOf == 0 && waiting <= waited_) return false;
-    last_left_out_ = end;
+    last_left_out_ = scan.end_utime();
     ++left_out_;
     return true;
   }
@@ -46,22 +47,20 @@ class ScanBacklog {
   static constexpr std::int64_t kKeptOf = 5;
   static constexpr std::int64_t kLongestCatchUp = 4;  // times what waited; by then every fifth is too much as well
   static constexpr Utime kCalm = 10 * kMicrosPerSecond;
-  static constexpr Utime kLongestPeriod = 200'000;  // [us] what is longer is a gap, or another clock
+  static constexpr double kPeriodOfInstants_s = 0.1;  // of scans whose points are all of one instant
 
-  void note_period(Utime end) {
-    const Utime period = end - previous_end_;
-    if (previous_end_ != 0 && period > 0 && period <= kLongestPeriod) period_s_ = 1e-6 * static_cast<double>(period);
-    previous_end_ = end;
+  /// From one scan to the next: scans of one sensor follow one another.
+  static double period_s(const Scan& scan) {
+    return scan.duration_us > 0 ? 1e-6 * static_cast<double>(scan.duration_us) : kPeriodOfInstants_s;
   }
 
   double most_s_;
-  double period_s_ = 0.1;
-  Utime previous_end_ = 0;
   Utime last_left_out_ = 0;
   double waited_ = 0.0;           // scans, when the computer fell behind
   std::int64_t catching_up_ = 0;  // scans to go, of which every fifth is kept
   std::int64_t left_out_ = 0;
   bool is_behind_ = false;
+  bool is_near_ = true;  // few have waited since the computer fell behind last
 };
 
 }  // namespace ignis
