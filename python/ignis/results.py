@@ -30,7 +30,7 @@ _CHANNELS = (
     "MAP_STATUS",
 )
 # Outcomes whose message carries no usable pose.
-_POSELESS = ("NOT_INITIALISED", "BAD_STAMP", "NO_IMU", "TOO_OFTEN", "SESSION_ENDED", "BEHIND")
+_POSELESS = ("NOT_INITIALISED", "BAD_STAMP", "SESSION_ENDED", "BEHIND")
 # Fields of the tables that are arrays in the message.
 _SCAN_ARRAYS = ("observability", "position", "quaternion")
 _LOOP_ARRAYS = ("relative_position", "relative_quaternion")

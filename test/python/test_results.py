@@ -92,6 +92,7 @@ def record_run(path: Path) -> None:
         ("LIO_SCAN_STATS", stats(9, **rejected)),
         ("LIO_SCAN_STATS", stats(10, session=2)),
         ("LIO_SCAN_STATS", stats(11, session=2, applied=0, reason=scan_stats_t.SESSION_ENDED)),
+        ("LIO_SCAN_STATS", stats(12, session=2, applied=0, reason=scan_stats_t.BEHIND)),
         ("LIO_KEYFRAME", keyframe(0, 1)),
         ("LIO_KEYFRAME", keyframe(1, 5)),
         ("SMOOTHED_KEYFRAMES", corrections([0, 1], [0.0, 9.0], [1.0, 5.0])),
@@ -127,8 +128,8 @@ def test_a_recorded_run_becomes_a_results_folder(tmp_path: Path) -> None:
     expected = [0.0, 0.1, 0.2, 0.3, 0.4, 0.4, 0.4, 0.4, 0.4, 0.0]
     np.testing.assert_allclose(corrected.poses.position[:, 2], expected, atol=1e-9)
     np.testing.assert_allclose(truth.poses.position, [[i, 1.0, 0.0] for i in range(1, 11)], atol=1e-9)
-    assert (said["scans"], said["applied"], said["sessions"]) == (13, 9, 2)
-    assert said["rejected"] == {"not_initialised": 1, "session_ended": 1, "too_few_matches": 2}
+    assert (said["scans"], said["applied"], said["sessions"]) == (14, 9, 2)
+    assert said["rejected"] == {"behind": 1, "not_initialised": 1, "session_ended": 1, "too_few_matches": 2}
     assert said["lost"] == 5
     assert said["receivers"]["graph_backend"]["LIO_STATE"]["lost"] == 3
     assert said["voxels"] == {"local": 3, "mid": 2, "coarse": 1}
@@ -140,7 +141,7 @@ def test_tables_have_one_row_per_message_and_one_column_per_number(tmp_path: Pat
     record_run(tmp_path / "run.lcmlog")
     write_results(tmp_path / "run.lcmlog", tmp_path / "out")
     rows = list(csv.DictReader((tmp_path / "out" / "scan_stats.csv").open()))
-    assert len(rows) == 13
+    assert len(rows) == 14
     assert (rows[3]["utime"], rows[3]["position_0"], rows[10]["reason"]) == ("1150000", "3.0", "3")
     (loop,) = csv.DictReader((tmp_path / "out" / "loops.csv").open())
     assert (loop["from_id"], loop["relative_quaternion_0"]) == ("1", "1.0")
