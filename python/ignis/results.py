@@ -130,7 +130,7 @@ def write_results(log: Path, folder: Path) -> dict[str, Any]:
 def summary(content: RunContent) -> dict[str, Any]:
     """Counts of a run: scans and why they were rejected, loops, voxels, messages lost per receiver."""
     stats, status = content.scan_stats, content.map_status
-    times = [m.time_spent_ms for m in stats]
+    times = [m.time_spent_ms for m in stats if m.reason != m.BEHIND]  # those that were left out took none
     reasons = Counter(constant_name(m, m.reason).lower() for m in stats if not m.applied)
     return {
         "duration_s": (stats[-1].utime - stats[0].utime) * 1e-6 if stats else 0.0,
