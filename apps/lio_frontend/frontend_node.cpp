@@ -112,12 +112,12 @@ void FrontendNode::on_scan_part(const messages::ScanPart& part) {
   data_heard_ = std::chrono::steady_clock::now();
   const auto kept = std::make_shared<const std::vector<std::byte>>(part.data.begin(), part.data.end());
   const std::optional<messages::EncodedScan> scan = assembler_.add(*kept, kept);
-  if (scan) handle(*scan, static_cast<double>(scan_counts_->waiting) / part.part_count);
+  if (scan) on_scan(*scan, static_cast<double>(scan_counts_->waiting) / part.part_count);
   scan_counts_->queue_drops = assembler_.incomplete() + backlog_.left_out();
 }
 
 /// Points are read of those scans only that are used: a computer that is behind has no time for the others.
-void FrontendNode::handle(const messages::EncodedScan& scan, double scans_waiting) {
+void FrontendNode::on_scan(const messages::EncodedScan& scan, double scans_waiting) {
   ++scans_heard_;
   const Scan frame = scan.read_frame();
   if (backlog_.leaves_out(frame, scans_waiting)) {

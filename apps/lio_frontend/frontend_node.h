@@ -38,7 +38,7 @@ class FrontendNode {
  private:
   const char* on_imu(const imu_t& message);
   void on_scan_part(const messages::ScanPart& part);
-  void handle(const messages::EncodedScan& scan, double scans_waiting);
+  void on_scan(const messages::EncodedScan& scan, double scans_waiting);
   void on_request(const keyframe_request_t& request);
   void on_cloud_request(const keyframe_request_t& request);
   [[nodiscard]] std::optional<std::size_t> resend_keyframe(std::int32_t session, std::int32_t id);

@@ -18,7 +18,8 @@ class ScanBacklog {
   /// `most_s`: how much may wait [s] before the computer counts as behind.
   explicit ScanBacklog(double most_s) : most_s_(most_s) {}
 
-  /// Whether to leave out a scan, of which the points do not matter, with `waiting` scans behind it.
+  /// Whether to leave out a scan behind which `waiting` others wait; once for each scan, in their order. Of the scan
+  /// only its stamps matter.
   [[nodiscard]] bool leaves_out(const Scan& scan, double waiting) {
     const double waiting_s = waiting * period_s(scan);
     if (is_near_ && waiting_s > most_s_) {

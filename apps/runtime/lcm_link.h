@@ -38,7 +38,7 @@ struct ReceiverCounts {
   std::int64_t lost = 0;         ///< by the sender's running number, and scans or keyframes with a part missing
   std::int64_t rejected = 0;     ///< wrong type, or a length that contradicts the counts inside
   std::int64_t queue_drops = 0;  ///< skipped by this process because it was late
-  std::int64_t waiting = 0;      ///< behind the message at hand; for handlers
+  std::int64_t waiting = 0;      ///< messages of the channel behind the one at hand; for handlers
 };
 
 /// Whether the running numbers of a channel can be checked: several senders share HEALTH, requests and commands.
