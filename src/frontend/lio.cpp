@@ -17,7 +17,9 @@ constexpr std::int32_t kMaxScanDurationUs = 500'000;       // longer is not a sc
 constexpr std::int64_t kMinScanPeriodUs = 8'000;           // of scans that are worth the time that matching takes
 constexpr std::int64_t kMaxLeadUs = 2 * kMicrosPerSecond;  // further ahead of the IMU is a broken stamp
 constexpr int kScansOfASettledMap = 40;                    // two seconds: an L1 has then looked everywhere
-constexpr double kDeskewTolerance = 0.005;                 // m: half the noise of a range
+// Two samples of a vehicle that shakes by 1 m/s^2 stand for all that are missing: beyond this, for more than 0.03 m/s.
+constexpr double kGapThatTellsNothing = 0.05;
+constexpr double kDeskewTolerance = 0.005;  // m: half the noise of a range
 
 /// What hits the sensor does not move the vehicle as it says: the mount springs back.
 bool is_shock(const ImuSample& sample, const FrontendConfig& config) {
@@ -69,7 +71,8 @@ void Lio::reset() {
   last_clipped_.reset();
   last_standstill_.reset();
   resumed_from_.reset();
-  confirm_until_.reset();
+  gap_end_.reset();
+  scans_since_gap_ = 0;
   unaided_.reset();
   session_end_.reset();
 }
@@ -98,7 +101,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   believed.saturated = sample.saturated || is_shock(sample, config_);
   result.fault = imu_.add(believed);
   if (result.fault != ImuFault::kNone) return result;
-  if (unaided_ && sample.utime > *confirm_until_) give_up_resumption();
+  if (confirmation_failed(sample.utime)) give_up_resumption();
   const Silence silence = before ? bridge_silence(*before, sample.utime, result.scans) : Silence::kNone;
   if (silence == Silence::kTooLong) return result;
   if (ends_with(sample.utime)) {
@@ -106,7 +109,8 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     return result;
   }
   trust_.note_imu(sample.utime);
-  if (believed.saturated) last_clipped_ = sample.utime;
+  const bool is_behind_a_gap = before && seconds_between(*before, sample.utime) > kGapThatTellsNothing;
+  if (believed.saturated || is_behind_a_gap) last_clipped_ = sample.utime;
 
   if (running_ && silence == Silence::kNone) {
     const std::size_t last = imu_.samples().size() - 1;

@@ -144,6 +144,8 @@ class Lio {
   [[nodiscard]] ScanResult verdict_of_ended_session(const Scan& scan) const;
   void give_up_resumption();
   void close_gap(Utime first_sample);
+  void await_confirmation(Utime since);
+  [[nodiscard]] bool confirmation_failed(Utime now) const;
   enum class Silence : std::int8_t { kNone, kBridged, kTooLong };  ///< of both streams: what became of it
   [[nodiscard]] Silence bridge_silence(Utime before, Utime sample, std::vector<ScanResult>& refused);
   void seek_confirmation(ScanReason reason);
@@ -196,7 +198,8 @@ class Lio {
   std::optional<Utime> last_standstill_;  ///< instant of the last correction to zero velocity
   std::optional<Utime> last_clipped_;     ///< instant of the newest sample that says nothing about the biases
   std::optional<Utime> resumed_from_;     ///< newest sample of the predecessor, until the first own one
-  std::optional<Utime> confirm_until_;    ///< when a resumption is given up
+  std::optional<Utime> gap_end_;          ///< since when a resumption waits for its confirmation
+  int scans_since_gap_ = 0;               ///< that it has had for it
   std::optional<FilterState> unaided_;    ///< the same state without a scan since the resumption, until it is confirmed
   std::optional<SessionEnd> session_end_;
   std::string start_note_;

@@ -11,7 +11,9 @@
 namespace ignis {
 namespace {
 
-constexpr double kConfirmationSeconds = 2.0;     // that a resumption has
+constexpr double kConfirmationSeconds = 2.0;     // that a resumption has at least
+constexpr int kScansOfAConfirmation = 20;        // and so many scans, twice what has to be applied
+constexpr double kLongestConfirmation = 8.0;     // s: however few come
 constexpr int kContradictionsOfAWrongPlace = 3;  // in a row; single ones come in any curve
 constexpr double kSilenceSeconds = 0.3;          // of inertial samples and scans, that two samples cannot stand for
 constexpr double kLongestSilence = 3.0;          // s: the longest that is bridged
@@ -51,7 +53,7 @@ Lio::Silence Lio::bridge_silence(Utime before, Utime sample, std::vector<ScanRes
   live_ = filter_.nominal;
   keyframer_.note_gap();
   unaided_ = filter_;
-  confirm_until_ = sample + to_micros(kConfirmationSeconds);
+  await_confirmation(sample);
   last_correction_.reset();
   trust_.note_resumption();
   return Silence::kBridged;
@@ -73,16 +75,30 @@ bool Lio::is_sound() const {
 void Lio::close_gap(Utime first_sample) {
   const double gap = seconds_between(*resumed_from_, first_sample);
   resumed_from_.reset();
-  confirm_until_ = first_sample + to_micros(kConfirmationSeconds);
+  await_confirmation(first_sample);
   if (gap > 0.0 && gap <= config_.resume_max_gap_s) return;
   reset();
   start_note_ = std::format("new session: the checkpoint is {:.1f} s older than the data (limit {:.1f})", gap,
                             config_.resume_max_gap_s);
 }
 
+void Lio::await_confirmation(Utime since) {
+  gap_end_ = since;
+  scans_since_gap_ = 0;
+}
+
+/// Of a slow LiDAR, or one whose scans are left out for want of time, two seconds are a handful of scans: they are
+/// given the time that it takes.
+bool Lio::confirmation_failed(Utime now) const {
+  if (!unaided_) return false;
+  const double seconds = seconds_between(*gap_end_, now);
+  return seconds > (scans_since_gap_ < kScansOfAConfirmation ? kLongestConfirmation : kConfirmationSeconds);
+}
+
 /// The first scan after a gap may settle in a wrong place, and then says so with confidence. The next ones tell.
 void Lio::seek_confirmation(ScanReason reason) {
   if (!unaided_) return;
+  ++scans_since_gap_;
   if (!trust_.awaits_confirmation()) {
     unaided_.reset();
     return;

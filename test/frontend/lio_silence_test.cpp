@@ -111,6 +111,33 @@ TEST(Fault_P7, ASilenceIsBridgedWhenARestartMayNotGoOn) {
   EXPECT_EQ(lio.session(), 0);
 }
 
+/// A front end that has no time leaves out scans: ten of them take longer than two seconds to come.
+TEST(Fault_P7, ASilenceIsBridgedByTheFewScansOfABusyFrontEnd) {
+  Drive input = silent(0.5, false);
+  const Utime from = drive().imu.front().utime + to_micros(6.0);
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.utime > from && scan.sequence % 5 != 0; });
+  Lio lio(test::tuned_config());
+  feed(lio, input, [](const ScanResult&) {});
+  EXPECT_EQ(lio.session(), 0) << lio.status().reason;
+  EXPECT_EQ(lio.status().trust, Trust::kOk) << lio.status().reason;
+}
+
+/// Too short to be a silence: two samples, each as wrong as the vehicle shakes, stand for seventy.
+TEST(Fault_P7, WhatTwoSamplesSayAcrossAGapTeachesTheBiasesNothing) {
+  const Drive input = silent(0.28, false);
+  const Utime to = drive().imu.front().utime + to_micros(8.28);
+  Lio lio(test::tuned_config());
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  int behind = 0;
+  feed(lio, input, [&](const ScanResult& scan) {
+    if (scan.stats.utime < to) before = scan.state.accel_bias;
+    if (scan.stats.utime < to || scan.stats.utime > to + 900'000) return;
+    EXPECT_EQ(scan.state.accel_bias, before);
+    ++behind;
+  });
+  EXPECT_GT(behind, 10);
+}
+
 TEST(Fault_P7, AStampOfTheFarFutureWhileScansHaveYetToConfirmThePlaceEndsNothing) {
   const Drive input = silent(0.5, false);
   const Utime to = drive().imu.front().utime + to_micros(8.5);
