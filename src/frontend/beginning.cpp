@@ -16,6 +16,9 @@ constexpr int kScansToConfirmSession = 60;                      // and something
 constexpr Utime kMostLeadUs = 2 * kMicrosPerSecond;             // of a command to begin anew
 constexpr Utime kHandOverUs = 150'000;                          // a scan comes later than the sample at its end
 constexpr Utime kMostGatheringUs = kMicrosPerSecond;            // of first scans, which come with gaps
+constexpr double kRestLasts = 1.0;                              // s: behind it, it has set off
+constexpr double kMotionLasts = 30.0;                           // s: of which nothing was heard
+constexpr double kLongestSearch = 30.0;                         // s: for a motion that scans do not tell
 constexpr std::int64_t kAskingPeriodUs = 3 * kMicrosPerSecond;  // of scans, which takes a quarter of it
 
 /// The position from which a new map begins is exact by definition.
@@ -69,17 +72,59 @@ ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
   return result;
 }
 
-void Lio::start(const FilterState& first) {
+/// A vehicle that was lost on its way seldom stops so that its new session can begin, and to the IMU it may well seem
+/// to stand: only scans are believed, unless they do not tell for too long.
+void Lio::begin_in_motion(std::string note) {
+  reset();
+  start_note_ = std::move(note);
+  if (config_.start != "at_rest") return;
+  FrontendConfig in_motion = config_;
+  in_motion.start = "moving";
+  initialisation_in_motion_.emplace(in_motion);
+}
+
+/// It goes on as it did when it was last heard of `seconds` ago.
+bool Lio::still_moves(double seconds) const {
+  return velocity_known_ && !has_rested(kRestLasts) && seconds < kMotionLasts;
+}
+
+bool Lio::has_rested(double seconds) const {
+  return !has_set_off_ ||
+         (last_standstill_ && seconds_between(*last_standstill_, filter_.nominal.utime) < seconds);
+}
+
+void Lio::await_start(const ImuSample& sample) {
+  if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
+  start_finding_.clear();  // what scans did not tell before says nothing of what keeps it waiting now
+  const std::optional<FilterState> first = initialisation_.add(sample);
+  if (initialisation_in_motion_) await_start_in_motion(sample);
+  if (running_ || !first) return;
+  if (config_.start == "moving") {
+    start_moving(*first);
+  } else if (!initialisation_in_motion_ || seconds_between(*lost_since_, sample.utime) > kLongestSearch) {
+    start(*first, true);
+  }
+}
+
+void Lio::await_start_in_motion(const ImuSample& sample) {
+  if (!lost_since_) lost_since_ = sample.utime;
+  const std::optional<FilterState> first = initialisation_in_motion_->add(sample);
+  if (!first) return;
+  start_moving(*first);
+  if (running_) initialisation_ = *initialisation_in_motion_;
+}
+
+void Lio::start(const FilterState& first, bool at_rest) {
   filter_ = first;
   sound_ = first;
-  has_set_off_ = config_.start != "at_rest";
-  if (config_.start == "at_rest" && config_.use_scan_matching) ask_scans_or_wait();
+  has_set_off_ = !at_rest;
+  if (at_rest && config_.use_scan_matching) ask_scans_or_wait();
   start_motion_ = StartMotion(config_);  // its memory is needed no more
   cautious_ = filter_.covariance;
   live_ = filter_.nominal;
   running_ = true;
   last_correction_ = first.nominal.utime;
-  velocity_known_ = config_.start == "at_rest";
+  velocity_known_ = at_rest;
   drift_ = MapDrift(config_.map_drift);
   if (!start_note_.empty()) doubt_start();
   opinion_.begin(first.nominal.utime);
@@ -91,7 +136,7 @@ void Lio::start(const FilterState& first) {
 void Lio::start_moving(const FilterState& first) {
   const Utime now = first.nominal.utime;
   if (!config_.use_scan_matching || start_motion_.has_dense_scans()) {
-    start(first);
+    start(first, false);
     return;
   }
   if (!start_motion_.has_window_until(now) || start_motion_.newest() < imu_.samples().front().utime) {
@@ -107,7 +152,7 @@ void Lio::start_moving(const FilterState& first) {
   FilterState found = moving_state(config_, first.nominal, *motion);
   found.nominal.utime = start_motion_.newest();
   start_motion_.fill(map_, *motion, found.nominal.T_odom_body);
-  start(found);
+  start(found, false);
   velocity_known_ = true;
   mapped_velocity_variance_ = velocity_variance(filter_.covariance);
   doubt_start();

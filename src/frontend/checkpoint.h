@@ -18,7 +18,7 @@
 /// which the filter bridges and grows its covariance over like any other. Files stand in apps/lio_frontend.
 namespace ignis {
 
-inline constexpr std::uint32_t kCheckpointVersion = 18;
+inline constexpr std::uint32_t kCheckpointVersion = 19;
 
 /// Requires lio.can_be_resumed().
 [[nodiscard]] std::vector<std::byte> encode_checkpoint(const Lio& lio, const std::string& config_hash);

@@ -93,9 +93,7 @@ Reacquisition Lio::place_to_begin() const {
 /// vouches for it. A vehicle that rests, or did so a moment ago, leaves none.
 MapScans Lio::salient_scans() const {
   MapScans scans{.first = sure_since(config_.match_radius_m)};
-  const bool rested = !has_set_off_ || (last_standstill_ && seconds_between(*last_standstill_, filter_.nominal.utime) <
-                                                                kSecondsWithoutTrail);
-  if (!rested) scans.last = drift_.newest_beyond(kBesideItsTrail, filter_.nominal.T_odom_body.translation);
+  if (!has_rested(kSecondsWithoutTrail)) scans.last = drift_.newest_beyond(kBesideItsTrail, filter_.nominal.T_odom_body.translation);
   return scans;
 }
 

@@ -48,6 +48,8 @@ void Lio::reset() {
   ++session_;
   imu_ = ImuBuffer();
   initialisation_ = ImuInitialisation(config_);
+  initialisation_in_motion_.reset();
+  lost_since_.reset();
   start_motion_ = StartMotion(config_);
   start_finding_.clear();
   awaits_scans_ = false;
@@ -101,7 +103,10 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   believed.saturated = sample.saturated || is_shock(sample, config_);
   result.fault = imu_.add(believed);
   if (result.fault != ImuFault::kNone) return result;
-  if (confirmation_failed(sample.utime)) give_up_resumption();
+  if (confirmation_failed(sample.utime)) {
+    give_up_resumption(result.scans);
+    return result;
+  }
   const Silence silence = before ? bridge_silence(*before, sample.utime, result.scans) : Silence::kNone;
   if (silence == Silence::kTooLong) return result;
   if (ends_with(sample.utime)) {
@@ -119,11 +124,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
                             config_.gravity_m);
     live_.utime = sample.utime;
   } else if (!running_) {
-    if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
-    start_finding_.clear();  // what scans did not tell before says nothing of what keeps it waiting now
-    if (const std::optional<FilterState> first = initialisation_.add(sample)) {
-      config_.start == "moving" ? start_moving(*first) : start(*first);
-    }
+    await_start(sample);
   }
   std::ranges::move(process_pending(), std::back_inserter(result.scans));
   if (running_) {
@@ -278,10 +279,15 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
     std::vector<Eigen::Vector3d> untold = blind;
     for (const Eigen::Vector3d& axis : match.doubtful) add_axis(untold, axis);
     result.keyframe = keyframer_.add_scan(published, match.information_body, untold, std::move(sparse),
-                                          !trust_.awaits_confirmation());
+                                          keyframe_pace());
   }
   result.cloud = std::move(cloud);
   return result;
+}
+
+KeyframePace Lio::keyframe_pace() const {
+  if (trust_.awaits_confirmation()) return KeyframePace::kNone;
+  return trust_.trust() == Trust::kLost ? KeyframePace::kSeldom : KeyframePace::kAsDriven;
 }
 
 /// Standing shows nothing new, and a map that went on taking scans would by and by follow whatever the pose does.

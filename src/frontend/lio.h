@@ -103,6 +103,7 @@ class Lio {
   [[nodiscard]] ScanResult process(const Scan& scan);
   [[nodiscard]] ScanResult result_of(const Scan& scan, const MatchResult& match, std::vector<CloudPoint> cloud,
                                      std::vector<CloudPoint> sparse);
+  [[nodiscard]] KeyframePace keyframe_pace() const;
   void forget_old_samples();
   [[nodiscard]] bool comes_too_soon(const Scan& scan) const;
   [[nodiscard]] MatchResult correct(const std::vector<CloudPoint>& cloud, const std::vector<CloudPoint>& sparse,
@@ -131,7 +132,14 @@ class Lio {
   void advance_to(Utime utime);
   void follow_to(Utime utime);
   void commit_to(Utime utime);
-  void start(const FilterState& first);
+  void begin_in_motion(std::string note);
+  void begin_behind(double seconds, std::string note);
+  [[nodiscard]] bool still_moves(double seconds) const;
+  /// Within the last `seconds`, or goes on resting.
+  [[nodiscard]] bool has_rested(double seconds) const;
+  void await_start(const ImuSample& sample);
+  void await_start_in_motion(const ImuSample& sample);
+  void start(const FilterState& first, bool at_rest);
   void start_moving(const FilterState& first);
   [[nodiscard]] std::string start_text() const;
   void ask_scans_or_wait();
@@ -142,7 +150,8 @@ class Lio {
   void begin_anew();
   [[nodiscard]] bool falls_to_ended_session(const Scan& scan) const;
   [[nodiscard]] ScanResult verdict_of_ended_session(const Scan& scan) const;
-  void give_up_resumption();
+  void give_up_resumption(std::vector<ScanResult>& refused);
+  void refuse_pending(std::vector<ScanResult>& refused);
   void close_gap(Utime first_sample);
   void await_confirmation(Utime since);
   [[nodiscard]] bool confirmation_failed(Utime now) const;
@@ -164,6 +173,8 @@ class Lio {
   std::int32_t session_ = 0;
   ImuBuffer imu_;
   ImuInitialisation initialisation_;
+  std::optional<ImuInitialisation> initialisation_in_motion_;  ///< beside it, after a loss on the way
+  std::optional<Utime> lost_since_;                            ///< since when it looks for a motion
   StartMotion start_motion_;              ///< until the start, or while first scans are gathered
   bool awaits_scans_ = false;             ///< none had come at the start
   std::optional<Utime> gathering_since_;  ///< end of the first of them

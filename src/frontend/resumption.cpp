@@ -4,6 +4,7 @@
 // and scans have to confirm the pose before anything is built on it. A driver that hung leaves the same gap.
 #include <algorithm>
 #include <format>
+#include <utility>
 
 #include "frontend/filter/steady_motion.h"
 #include "frontend/lio.h"
@@ -35,12 +36,10 @@ void Lio::resume() {
 Lio::Silence Lio::bridge_silence(Utime before, Utime sample, std::vector<ScanResult>& refused) {
   const double silence = seconds_between(last_scan_end_ ? std::max(before, *last_scan_end_) : before, sample);
   if (!running_ || !velocity_known_ || map_.empty() || silence < kSilenceSeconds) return Silence::kNone;
-  for (const Scan& scan : pending_) refused.push_back(refuse(scan, ScanReason::kNoImu));
-  pending_.clear();
+  refuse_pending(refused);
   if (silence > kLongestSilence) {
-    reset();
-    start_note_ = std::format("new session: neither IMU data nor scans came for {:.1f} s (limit {:.1f})", silence,
-                              kLongestSilence);
+    begin_behind(silence, std::format("new session: neither IMU data nor scans came for {:.1f} s (limit {:.1f})",
+                                      silence, kLongestSilence));
     return Silence::kTooLong;
   }
   advance_to(before);
@@ -77,9 +76,18 @@ void Lio::close_gap(Utime first_sample) {
   resumed_from_.reset();
   await_confirmation(first_sample);
   if (gap > 0.0 && gap <= config_.resume_max_gap_s) return;
-  reset();
-  start_note_ = std::format("new session: the checkpoint is {:.1f} s older than the data (limit {:.1f})", gap,
-                            config_.resume_max_gap_s);
+  begin_behind(gap, std::format("new session: the checkpoint is {:.1f} s older than the data (limit {:.1f})", gap,
+                                config_.resume_max_gap_s));
+}
+
+/// Behind a time of which nothing is known, that is too long to be bridged.
+void Lio::begin_behind(double seconds, std::string note) {
+  if (still_moves(seconds)) {
+    begin_in_motion(std::move(note));
+  } else {
+    reset();
+    start_note_ = std::move(note);
+  }
 }
 
 void Lio::await_confirmation(Utime since) {
@@ -87,12 +95,13 @@ void Lio::await_confirmation(Utime since) {
   scans_since_gap_ = 0;
 }
 
-/// Of a slow LiDAR, or one whose scans are left out for want of time, two seconds are a handful of scans: they are
-/// given the time that it takes.
+/// Of a slow LiDAR, or one whose scans are left out for want of time, two seconds are a handful of scans. If any come,
+/// they are given the time that it takes.
 bool Lio::confirmation_failed(Utime now) const {
   if (!unaided_) return false;
   const double seconds = seconds_between(*gap_end_, now);
-  return seconds > (scans_since_gap_ < kScansOfAConfirmation ? kLongestConfirmation : kConfirmationSeconds);
+  const bool are_few = scans_since_gap_ > 0 && scans_since_gap_ < kScansOfAConfirmation;
+  return seconds > (are_few ? kLongestConfirmation : kConfirmationSeconds);
 }
 
 /// The first scan after a gap may settle in a wrong place, and then says so with confidence. The next ones tell.
@@ -113,13 +122,16 @@ void Lio::seek_confirmation(ScanReason reason) {
   trust_.note_resumption();
 }
 
-/// Nobody knows where in the old map the vehicle is. Attitude to gravity, biases and velocity carry over.
-void Lio::give_up_resumption() {
-  filter_ = *unaided_;
-  cautious_ = unaided_->covariance;
-  unaided_.reset();
-  begin_new_map("scans did not confirm the pose after a gap, a new map was begun");
-  start_note_ = "new session: scans did not confirm the pose after a gap";
+/// Nobody knows where in the old map the vehicle is, nor, after seconds of dead reckoning across a gap, how fast it
+/// goes: a new session that went on with that would fly away. Scans that waited are `refused`.
+void Lio::give_up_resumption(std::vector<ScanResult>& refused) {
+  refuse_pending(refused);
+  begin_in_motion("new session: scans did not confirm the pose after a gap");
+}
+
+void Lio::refuse_pending(std::vector<ScanResult>& refused) {
+  for (const Scan& scan : pending_) refused.push_back(refuse(scan, ScanReason::kNoImu));
+  pending_.clear();
 }
 
 }  // namespace ignis

@@ -26,6 +26,19 @@ void feed(Lio& lio, const Drive& input, const std::function<void(const ScanResul
   }
 }
 
+/// [m/s]
+double speed_at_end(Lio& lio, const Drive& input) {
+  ImuSample next = input.imu.back();
+  next.utime += 4'000;
+  const std::optional<NavState> state = lio.add_imu(next).state;
+  return state ? state->v_odom.norm() : -1.0;
+}
+
+double true_speed_at_end(const Drive& input) {
+  const double end = test::drive_seconds(input, input.imu.back().utime);
+  return (input.truth(end).translation - input.truth(end - 0.1).translation).norm() / 0.1;
+}
+
 TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnannouncedError) {
   for (const double seconds : {0.25, 0.5, 1.0, 2.0, 2.9, 4.0}) {
     Drive input = drive();
@@ -49,7 +62,7 @@ TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnann
       EXPECT_LT(error, 0.3) << seconds;
     }
     if (seconds > 3.0) {
-      EXPECT_NE(lio.status().reason.find("neither IMU data nor scans"), std::string::npos);
+      EXPECT_NE(lio.start_note().find("neither IMU data nor scans"), std::string::npos);
     }
   }
 }
@@ -136,6 +149,66 @@ TEST(Fault_P7, WhatTwoSamplesSayAcrossAGapTeachesTheBiasesNothing) {
     ++behind;
   });
   EXPECT_GT(behind, 10);
+}
+
+/// What happened from 8 s to 8 s + `missed` is not in it, and its stamps tell of `told` seconds only.
+Drive with_a_jump(Drive whole, double missed, double told) {
+  const Utime from = whole.imu.front().utime + to_micros(8.0);
+  const Utime to = from + to_micros(missed);
+  const Utime early = to_micros(missed - told);
+  std::erase_if(whole.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+  std::erase_if(whole.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+  for (ImuSample& sample : whole.imu) sample.utime -= sample.utime >= to ? early : 0;
+  for (Scan& scan : whole.scans) scan.utime -= scan.utime >= to ? early : 0;
+  return whole;
+}
+
+/// It came elsewhere than any model foretells: farther along a curve, and turned.
+TEST(Fault_P7, APlaceThatOnlyLooksRightBehindASilenceIsNotTakenAndANewSessionBeginsInMotion) {
+  constexpr double kMissed = 7.0;
+  int begun = 0;
+  for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+    const Drive whole =
+        test::simulate(test::furnished_hall(), test::ellipse_drive(2.5, 6.0, 4.0, 1.3), 26.0, {}, seed);
+    const Drive input = with_a_jump(whole, kMissed, 1.0);
+    const Utime jump = whole.imu.front().utime + to_micros(8.0);
+    Lio lio(test::tuned_config());
+    int unannounced = 0;
+    feed(lio, input, [&](const ScanResult& scan) {
+      if (!scan.has_state || scan.stats.session > 0) return;
+      const double late = scan.stats.utime > jump ? kMissed - 1.0 : 0.0;
+      const Pose truth = whole.truth(test::drive_seconds(whole, scan.stats.utime) + late);
+      const double error = (scan.state.T_odom_body.translation - truth.translation).norm();
+      unannounced += error > 0.5 && lio.status().trust == Trust::kOk ? 1 : 0;
+    });
+    EXPECT_EQ(unannounced, 0) << "seed " << seed;
+    if (lio.session() == 0) continue;
+    ++begun;
+    EXPECT_EQ(lio.status().trust, Trust::kOk) << lio.status().reason << ", seed " << seed;
+    EXPECT_NEAR(speed_at_end(lio, input), true_speed_at_end(whole), 0.2) << "seed " << seed;
+  }
+  EXPECT_GT(begun, 1);
+}
+
+TEST(Fault_P7, BehindALongSilenceASessionBeginsInMotionToo) {
+  Lio lio(test::tuned_config());
+  feed(lio, silent(4.0, false), [](const ScanResult&) {});
+  EXPECT_EQ(lio.session(), 1);
+  ASSERT_TRUE(lio.status().running) << lio.status().reason;
+  EXPECT_NEAR(speed_at_end(lio, drive()), true_speed_at_end(drive()), 0.2) << lio.status().reason;
+}
+
+/// Scans do not tell there how fast it goes. It stood before, and is not asked.
+TEST(Fault_P7, BehindALongSilenceOfAVehicleThatStandsItBeginsAtRest) {
+  Drive input = test::simulate(test::bare_corridor(), test::straight_drive(60.0, 1.0), 14.0, {}, 1);
+  const Utime from = input.imu.front().utime + to_micros(5.0);
+  const Utime to = from + to_micros(5.0);
+  std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+  Lio lio(test::tuned_config());
+  feed(lio, input, [](const ScanResult&) {});
+  EXPECT_EQ(lio.session(), 1);
+  EXPECT_TRUE(lio.status().running) << lio.status().reason;
 }
 
 TEST(Fault_P7, AStampOfTheFarFutureWhileScansHaveYetToConfirmThePlaceEndsNothing) {

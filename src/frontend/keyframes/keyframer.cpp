@@ -13,6 +13,7 @@ namespace ignis {
 namespace {
 
 constexpr double kLongestImu = 120.0;             // s: nobody integrates a longer interval (backend.imu.max_interval_s)
+constexpr double kSecondsBetweenSeldomOnes = 1.0;
 constexpr double kStationaryDisplacement = 0.03;  // m: above the jitter of a standing filter
 constexpr double kStationaryTurnRate = 0.02;      // rad/s, mean over the interval
 
@@ -55,7 +56,7 @@ void Keyframer::add_sighted(const SightedSpeed& sighted, const FilterState& corr
 
 std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Matrix6d& information_body,
                                             std::span<const Eigen::Vector3d> blind, std::vector<CloudPoint> cloud,
-                                            bool confirmed) {
+                                            KeyframePace pace) {
   const NavState& state = filter.nominal;
   recent_.push_back({state.utime, state.T_odom_body, std::move(cloud)});
   const Utime oldest = state.utime - to_micros(config_.keyframe_cloud_seconds);
@@ -64,7 +65,7 @@ std::optional<Keyframe> Keyframer::add_scan(const FilterState& filter, const Mat
   if (next_id_ > 0) information_.add_scan(state, information_body, blind);
   ++scans_;
   note_motion(state);
-  if (!confirmed || !due(state)) return std::nullopt;
+  if (!allows(pace, state) || !due(state)) return std::nullopt;
   return make(filter);
 }
 
@@ -79,6 +80,11 @@ bool Keyframer::due(const NavState& state) const {
   const double distance = (state.T_odom_body.translation - last_.T_odom_body.translation).norm();
   return distance >= config_.keyframe_dist_m || heading_change(last_, state) >= config_.keyframe_yaw_rad ||
          seconds_between(last_.utime, state.utime) >= config_.keyframe_max_seconds;
+}
+
+bool Keyframer::allows(KeyframePace pace, const NavState& state) const {
+  if (pace != KeyframePace::kSeldom) return pace == KeyframePace::kAsDriven;
+  return next_id_ == 0 || seconds_between(last_.utime, state.utime) >= kSecondsBetweenSeldomOnes;
 }
 
 bool Keyframer::stood_still(const NavState& state) const {

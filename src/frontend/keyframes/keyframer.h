@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -25,6 +26,10 @@ void transfer(auto& io, FieldsOf<TakenSpeed> auto& taken) {
   io.matrix(taken.v_odom);
   io.number(taken.velocity_variance);
 }
+
+/// kSeldom: at most one a second. How far a lost vehicle went is not known: one that seems to go at 80 m/s would make
+/// every scan a keyframe, which costs back end, journal and map without end.
+enum class KeyframePace : std::int8_t { kAsDriven, kSeldom, kNone };
 
 /// Decides when a keyframe is due (distance, turn, or time since the last one; the first scan always) and assembles it:
 /// the last second of deskewed scans as one cloud, the IMU samples and the scan-matching information of the interval.
@@ -50,10 +55,10 @@ class Keyframer {
 
   /// A scan at the filter's state after it. `information_body` is zero for scans that were not applied; shifts along
   /// the unit axes `blind` (odom) it does not observe. `cloud` is in the body frame at that state. A keyframe that is
-  /// due waits while the pose is not `confirmed`.
+  /// due waits until the `pace` allows for it.
   std::optional<Keyframe> add_scan(const FilterState& filter, const Matrix6d& information_body,
                                    std::span<const Eigen::Vector3d> blind, std::vector<CloudPoint> cloud,
-                                   bool confirmed = true);
+                                   KeyframePace pace = KeyframePace::kAsDriven);
 
  private:
   struct RegisteredScan {
@@ -64,6 +69,7 @@ class Keyframer {
 
   void note_motion(const NavState& state);
   [[nodiscard]] bool due(const NavState& state) const;
+  [[nodiscard]] bool allows(KeyframePace pace, const NavState& state) const;
   [[nodiscard]] bool stood_still(const NavState& state) const;
   [[nodiscard]] std::optional<SightedSpeed> sighted_now(const FilterState& filter) const;
   [[nodiscard]] std::vector<CloudPoint> merged_cloud(const Pose& T_odom_body) const;

@@ -22,6 +22,9 @@ constexpr double kStep = 1.0;               // m, in which the way driven is cou
 // reached 0.29 m; along a corridor it is metres after 40 m.
 constexpr double kUsualDrift = 1e-4;
 
+constexpr double kResidualShare = 0.02;  // of each scan in the running mean
+constexpr double kPoorFit = 1.3;
+
 }  // namespace
 
 void TrustMonitor::note_imu(Utime utime) {
@@ -64,6 +67,8 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   }
   last_applied_ = stats.utime;
   scans_since_applied_ = 0;
+  if (resumed_ && !fits_as_before(evidence)) return;
+  if (!resumed_) usual_residual_ += (usual_residual_ > 0.0 ? kResidualShare : 1.0) * (stats.mean_residual - usual_residual_);
   scans_to_confirm_ = std::max(scans_to_confirm_ - 1, 0);
   if (scans_to_confirm_ > 0) return;
   lost_.clear();
@@ -107,6 +112,13 @@ void TrustMonitor::note_loss(std::string reason) {
   ++losses_;
   scans_to_confirm_ = kScansToConfirm;
   corrections_.clear();
+}
+
+/// In a place that only looks like the right one a scan finds planes, too, but lies in them less well, and what does not
+/// lie where it should seems to move.
+bool TrustMonitor::fits_as_before(const ScanEvidence& evidence) const {
+  const bool is_thin = usual_residual_ <= 0.0 || evidence.stats.mean_residual < kPoorFit * usual_residual_;
+  return is_thin && !evidence.restless;
 }
 
 void TrustMonitor::follow(const Eigen::Vector3d& position) {

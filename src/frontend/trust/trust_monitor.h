@@ -86,6 +86,7 @@ class TrustMonitor {
   /// For too long no scan has fitted.
   [[nodiscard]] bool is_out_of_sight(Utime at) const;
   void follow(const Eigen::Vector3d& position);
+  [[nodiscard]] bool fits_as_before(const ScanEvidence& evidence) const;
   [[nodiscard]] double usual_sigma() const;
 
   FrontendConfig config_;
@@ -107,6 +108,7 @@ class TrustMonitor {
   double sigma_since_start_ = 0.0;
   double driven_m_ = 0.0;                           ///< metre by metre: what a vehicle that stands jitters by is no way
   Eigen::Vector3d mark_ = Eigen::Vector3d::Zero();  ///< [m] odom, where the last of them ended
+  double usual_residual_ = 0.0;  ///< [m] of scans that were applied, a running mean; 0 before the first
   double acceleration_sigma_ = 0.0;
   bool restless_ = false;
   std::deque<Correction> corrections_;
@@ -134,6 +136,7 @@ class TrustMonitor {
     io.number(monitor.sigma_since_start_);
     io.number(monitor.driven_m_);
     io.matrix(monitor.mark_);
+    io.number(monitor.usual_residual_);
     io.number(monitor.acceleration_sigma_);
     io.number(monitor.restless_);
     io.list(monitor.corrections_);

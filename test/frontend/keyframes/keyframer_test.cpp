@@ -14,7 +14,7 @@ class Stepper {
   explicit Stepper(const FrontendConfig& config = {}) : keyframer(config, 3) {}
 
   std::optional<Keyframe> step(const Eigen::Vector3d& position, double yaw = 0.0, double speed = 0.0,
-                               bool confirmed = true) {
+                               KeyframePace pace = KeyframePace::kAsDriven) {
     for (int i = 0; i < 5; ++i) {
       ImuSample sample;
       sample.utime = now + 10'000 * i;
@@ -26,7 +26,7 @@ class Stepper {
     filter.nominal.utime = now;
     filter.nominal.T_odom_body = {frames::from_yaw_pitch_roll({yaw, 0.0, 0.0}), position};
     filter.nominal.v_odom = {0.0, 0.0, -speed};
-    return keyframer.add_scan(filter, Matrix6d::Identity(), {}, cloud, confirmed);
+    return keyframer.add_scan(filter, Matrix6d::Identity(), {}, cloud, pace);
   }
 
   Keyframer keyframer;
@@ -52,6 +52,16 @@ TEST(Keyframer, FiresOnDistance) {
   const auto keyframe = stepper.step({0, 0, -4.01});
   ASSERT_TRUE(keyframe.has_value());
   EXPECT_EQ(keyframe->id, 1);
+}
+
+TEST(Keyframer, OfALostVehicleMakesOneASecondHoweverFastItSeemsToGo) {
+  Stepper stepper;
+  (void)stepper.step({0, 0, 0});
+  int made = 0;
+  for (int i = 1; i <= 100; ++i) made += stepper.step({0, 0, -5.0 * i}, 0.0, 100.0, KeyframePace::kSeldom) ? 1 : 0;
+  EXPECT_EQ(made, 5) << "in five seconds";
+  EXPECT_FALSE(stepper.step({0, 0, -600}, 0.0, 100.0, KeyframePace::kNone).has_value());
+  EXPECT_TRUE(stepper.step({0, 0, -600}, 0.0, 100.0).has_value());
 }
 
 TEST(Keyframer, FiresOnTurnAcrossHalfATurn) {
@@ -107,7 +117,7 @@ TEST(Keyframer, AGapMarksItsIntervalOnly) {
 TEST(Keyframer, ForgetsSamplesOfAnIntervalThatIsTooLongToIntegrate) {
   Stepper stepper;
   stepper.step({0, 0, 0});
-  for (int i = 0; i < 20 * 300; ++i) EXPECT_FALSE(stepper.step({0, 0, 0}, 0.0, 0.0, false).has_value());
+  for (int i = 0; i < 20 * 300; ++i) EXPECT_FALSE(stepper.step({0, 0, 0}, 0.0, 0.0, KeyframePace::kNone).has_value());
   const auto keyframe = stepper.step({0, 0, 0});
   ASSERT_TRUE(keyframe.has_value());
   EXPECT_FALSE(keyframe->imu_complete);

@@ -109,6 +109,19 @@ TEST(TrustMonitor, ALossOutlivesASilenceOfBothStreams) {
   expect_until_ten_fit(feed, Trust::kLost, "no scan had fitted for 2 s (1 applied scans to go)");
 }
 
+TEST(TrustMonitor, ScansThatLieInTheirPlanesLessWellThanBeforeConfirmNoPlace) {
+  Feed feed;
+  feed.evidence.stats.mean_residual = 0.008;
+  feed.run(100);
+  feed.monitor.note_resumption();
+  feed.evidence.stats.mean_residual = 0.016;
+  feed.run(100);
+  EXPECT_TRUE(feed.monitor.awaits_confirmation());
+  feed.evidence.stats.mean_residual = 0.010;
+  expect_until_ten_fit(feed, Trust::kDegraded, "resumed");
+  EXPECT_FALSE(feed.monitor.awaits_confirmation());
+}
+
 TEST(TrustMonitor, WhatIsSaidOfAScanDoesNotDependOnHowFarTheSamplesAreAhead) {
   Feed feed;
   feed.run_without_scans(1.0);
