@@ -90,6 +90,9 @@ LioStatus Lio::status() const {
 
 /// A start in motion that the scans were asked about is theirs to tell: the IMU knows no velocity.
 std::string Lio::start_text() const {
+  if (!running_ && initialisation_in_motion_) {
+    return start_finding_.empty() ? initialisation_in_motion_->report() : start_finding_;
+  }
   if (start_finding_.empty()) return initialisation_.report();
   if (config_.start == "moving") return running_ ? "started moving: " + start_finding_ : start_finding_;
   return initialisation_.report() + "; " + start_finding_;

@@ -21,6 +21,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import re
 import sys
 import threading
 import time
@@ -48,6 +49,9 @@ from stream_server import Server  # noqa: E402
 matplotlib.use("Agg")
 
 PROCESSES = ("l1_driver", "lio_frontend", "graph_backend", "map_builder")
+STATES = ("OK", "DEGRADED", "LOST", "FAULT")
+NUMBERS = re.compile(r"[0-9.]+")
+MOST_TOLD = 400
 SETTLED_S = 60.0  # caches and windows fill
 
 
@@ -139,6 +143,7 @@ def drive(
     """One soak; returns the samples and what was counted."""
     samples: list[Sample] = []
     ids: set[int] = set()
+    told: list[tuple[float, str, str]] = []
 
     def note(channel: str, message: Any) -> None:
         if channel == "LIO_KEYFRAME":
@@ -159,6 +164,7 @@ def drive(
                 pipeline.check()
                 pages.look(passed)
                 for (name, pid), (_, health) in listener.health.items():
+                    note_text(told, round(passed, 1), name, health)
                     descriptors, threads = used_by(pid)
                     samples.append(
                         Sample(
@@ -196,7 +202,18 @@ def drive(
             for each in watching
         ],
         "pages": browser_pages,
+        "told": told[-MOST_TOLD:],
     }
+
+
+def note_text(told: list[tuple[float, str, str]], seconds: float, name: str, health: Any) -> None:
+    """Keeps what a process says of itself when it begins to be not OK, or OK again, or so for another reason."""
+    words = f"{STATES[health.state]}: {NUMBERS.sub('#', health.state_text)}"
+    before = next((text for _, other, text in reversed(told) if other == name), "OK")
+    if health.state == 0 and before.startswith("OK"):
+        return
+    if words != before:
+        told.append((seconds, name, words))
 
 
 def judged(samples: list[Sample], figures: dict[str, Any]) -> list[str]:
