@@ -89,8 +89,7 @@ bool Lio::still_moves(double seconds) const {
 }
 
 bool Lio::has_rested(double seconds) const {
-  return !has_set_off_ ||
-         (last_standstill_ && seconds_between(*last_standstill_, filter_.nominal.utime) < seconds);
+  return !has_set_off_ || (last_standstill_ && seconds_between(*last_standstill_, filter_.nominal.utime) < seconds);
 }
 
 void Lio::await_start(const ImuSample& sample) {

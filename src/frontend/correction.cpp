@@ -93,7 +93,8 @@ Reacquisition Lio::place_to_begin() const {
 /// vouches for it. A vehicle that rests, or did so a moment ago, leaves none.
 MapScans Lio::salient_scans() const {
   MapScans scans{.first = sure_since(config_.match_radius_m)};
-  if (!has_rested(kSecondsWithoutTrail)) scans.last = drift_.newest_beyond(kBesideItsTrail, filter_.nominal.T_odom_body.translation);
+  if (!has_rested(kSecondsWithoutTrail))
+    scans.last = drift_.newest_beyond(kBesideItsTrail, filter_.nominal.T_odom_body.translation);
   return scans;
 }
 

@@ -110,6 +110,11 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
     give_up_resumption(result.scans);
     return result;
   }
+  if (has_flown_away()) {
+    refuse_pending(result.scans);
+    begin_in_motion("new session: lost, and what it took for its motion cannot be");
+    return result;
+  }
   const Silence silence = before ? bridge_silence(*before, sample.utime, result.scans) : Silence::kNone;
   if (silence == Silence::kTooLong) return result;
   if (ends_with(sample.utime)) {
@@ -281,8 +286,8 @@ ScanResult Lio::result_of(const Scan& scan, const MatchResult& match, std::vecto
   if (velocity_known_) {
     std::vector<Eigen::Vector3d> untold = blind;
     for (const Eigen::Vector3d& axis : match.doubtful) add_axis(untold, axis);
-    result.keyframe = keyframer_.add_scan(published, match.information_body, untold, std::move(sparse),
-                                          keyframe_pace());
+    result.keyframe =
+        keyframer_.add_scan(published, match.information_body, untold, std::move(sparse), keyframe_pace());
   }
   result.cloud = std::move(cloud);
   return result;

@@ -151,6 +151,7 @@ class Lio {
   [[nodiscard]] bool falls_to_ended_session(const Scan& scan) const;
   [[nodiscard]] ScanResult verdict_of_ended_session(const Scan& scan) const;
   void give_up_resumption(std::vector<ScanResult>& refused);
+  [[nodiscard]] bool has_flown_away() const;
   void refuse_pending(std::vector<ScanResult>& refused);
   void close_gap(Utime first_sample);
   void await_confirmation(Utime since);
@@ -175,11 +176,11 @@ class Lio {
   ImuInitialisation initialisation_;
   std::optional<ImuInitialisation> initialisation_in_motion_;  ///< beside it, after a loss on the way
   std::optional<Utime> lost_since_;                            ///< since when it looks for a motion
-  StartMotion start_motion_;              ///< until the start, or while first scans are gathered
-  bool awaits_scans_ = false;             ///< none had come at the start
-  std::optional<Utime> gathering_since_;  ///< end of the first of them
-  std::string start_finding_;             ///< what scans said of the motion then
-  std::optional<Utime> last_asked_;       ///< instant at which scans did not tell how fast the vehicle goes
+  StartMotion start_motion_;                                   ///< until the start, or while first scans are gathered
+  bool awaits_scans_ = false;                                  ///< none had come at the start
+  std::optional<Utime> gathering_since_;                       ///< end of the first of them
+  std::string start_finding_;                                  ///< what scans said of the motion then
+  std::optional<Utime> last_asked_;  ///< instant at which scans did not tell how fast the vehicle goes
   ScanSelector selector_;
   Deskewer deskewer_;
   VoxelThinner thinner_;

@@ -168,8 +168,7 @@ TEST(Fault_P7, APlaceThatOnlyLooksRightBehindASilenceIsNotTakenAndANewSessionBeg
   constexpr double kMissed = 7.0;
   int begun = 0;
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
-    const Drive whole =
-        test::simulate(test::furnished_hall(), test::ellipse_drive(2.5, 6.0, 4.0, 1.3), 26.0, {}, seed);
+    const Drive whole = test::simulate(test::furnished_hall(), test::ellipse_drive(2.5, 6.0, 4.0, 1.3), 26.0, {}, seed);
     const Drive input = with_a_jump(whole, kMissed, 1.0);
     const Utime jump = whole.imu.front().utime + to_micros(8.0);
     Lio lio(test::tuned_config());
@@ -212,6 +211,25 @@ TEST(Fault_P7, BehindALongSilenceOfAVehicleThatStandsItBeginsAtRest) {
   feed(lio, input, [](const ScanResult&) {});
   EXPECT_EQ(lio.session(), 1);
   EXPECT_TRUE(lio.status().running) << lio.status().reason;
+}
+
+/// Blind, and the accelerometer reads 5 m/s^2 too much: within 8 s it would go at 40 m/s.
+TEST(Fault_P7, ALostVehicleThatSeemsToFlyBeginsAnew) {
+  Drive input = drive();
+  const Utime from = sample_at(input, 6.0)->utime;
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from; });
+  for (ImuSample& sample : input.imu) sample.accel.z() -= sample.utime >= from ? 5.0 : 0.0;
+  Lio lio(test::tuned_config());
+  double fastest = 0.0;
+  for (auto scan = input.scans.begin(); const ImuSample& sample : input.imu) {
+    const ImuResult result = lio.add_imu(sample);
+    if (result.state) fastest = std::max(fastest, result.state->v_odom.norm());
+    for (; scan != input.scans.end() && scan->end_utime() <= sample.utime; ++scan) (void)lio.add_scan(*scan);
+  }
+  EXPECT_EQ(lio.session(), 1);
+  EXPECT_NE(lio.status().reason.find("cannot be"), std::string::npos) << lio.status().reason;
+  EXPECT_GT(fastest, 20.0);
+  EXPECT_LT(fastest, 42.0);
 }
 
 TEST(Fault_P7, AStampOfTheFarFutureWhileScansHaveYetToConfirmThePlaceEndsNothing) {

@@ -12,7 +12,7 @@
 namespace ignis {
 namespace {
 
-constexpr double kLongestImu = 120.0;             // s: nobody integrates a longer interval (backend.imu.max_interval_s)
+constexpr double kLongestImu = 120.0;  // s: nobody integrates a longer interval (backend.imu.max_interval_s)
 constexpr double kSecondsBetweenSeldomOnes = 1.0;
 constexpr double kStationaryDisplacement = 0.03;  // m: above the jitter of a standing filter
 constexpr double kStationaryTurnRate = 0.02;      // rad/s, mean over the interval

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <span>
 #include <vector>

@@ -68,7 +68,8 @@ void TrustMonitor::note_scan(const ScanEvidence& evidence) {
   last_applied_ = stats.utime;
   scans_since_applied_ = 0;
   if (resumed_ && !fits_as_before(evidence)) return;
-  if (!resumed_) usual_residual_ += (usual_residual_ > 0.0 ? kResidualShare : 1.0) * (stats.mean_residual - usual_residual_);
+  if (!resumed_)
+    usual_residual_ += (usual_residual_ > 0.0 ? kResidualShare : 1.0) * (stats.mean_residual - usual_residual_);
   scans_to_confirm_ = std::max(scans_to_confirm_ - 1, 0);
   if (scans_to_confirm_ > 0) return;
   lost_.clear();
@@ -114,8 +115,8 @@ void TrustMonitor::note_loss(std::string reason) {
   corrections_.clear();
 }
 
-/// In a place that only looks like the right one a scan finds planes, too, but lies in them less well, and what does not
-/// lie where it should seems to move.
+/// In a place that only looks like the right one a scan finds planes, too, but lies in them less well, and what does
+/// not lie where it should seems to move.
 bool TrustMonitor::fits_as_before(const ScanEvidence& evidence) const {
   const bool is_thin = usual_residual_ <= 0.0 || evidence.stats.mean_residual < kPoorFit * usual_residual_;
   return is_thin && !evidence.restless;
