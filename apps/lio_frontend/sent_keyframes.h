@@ -16,8 +16,10 @@ class SentKeyframes {
  public:
   explicit SentKeyframes(std::size_t limit) : limit_(limit) {}
 
-  /// Keeps a keyframe, drops the oldest beyond the limit, and returns the messages to send.
+  /// Keeps a keyframe, drops the oldest beyond the limit, and returns the messages to send. One of the same number that
+  /// a killed process wrote down and never told gives way to it.
   const std::vector<keyframe_t>& add(const Keyframe& keyframe) {
+    std::erase_if(sent_, [&](const Sent& sent) { return sent.session == keyframe.session && sent.id == keyframe.id; });
     sent_.push_back({.session = keyframe.session, .id = keyframe.id, .parts = messages::to_messages(keyframe)});
     if (sent_.size() > limit_) sent_.pop_front();
     return sent_.back().parts;

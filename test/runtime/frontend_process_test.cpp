@@ -71,6 +71,20 @@ TEST(SentKeyframes, KeepsTheNewestAndGivesThemBackAsTheyWereSent) {
   EXPECT_EQ(sent.find(2, 9)->front().id, 9);
 }
 
+/// Killed between writing a keyframe and the state that holds its number: a successor reads it back and makes another.
+TEST(SentKeyframes, GivesBackTheOneThatWasToldAndNotOneThatAKilledProcessLeft) {
+  SentKeyframes sent(3);
+  Keyframe left = keyframe(2, 7, 5000);
+  left.state.utime = 1'000'000;
+  Keyframe told = left;
+  told.state.utime = 1'050'000;
+  sent.add(left);
+  sent.add(told);
+  ASSERT_NE(sent.find(2, 7), nullptr);
+  EXPECT_EQ(sent.find(2, 7)->front().utime, 1'050'000);
+  EXPECT_EQ(sent.size(), 1U);
+}
+
 TEST(SentKeyframes, TakesNoMoreRoomThanTheMessagesNeed) {
   SentKeyframes sent(1);
   for (const keyframe_t& part : sent.add(keyframe(0, 0, 5000))) {
