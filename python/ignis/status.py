@@ -16,7 +16,7 @@ from ignis.doctoring.data import PROCESSES
 from ignis.errors import EXIT_FAILURE, run_command
 from ignis.hz import rate_table
 
-_STATES = {0: "OK", 1: "DEGRADED", 2: "LOST", 3: "FAULT"}
+STATES = {0: "OK", 1: "DEGRADED", 2: "LOST", 3: "FAULT"}
 _COLOURS = {"OK": "32", "DEGRADED": "33", "LOST": "31", "FAULT": "31", "GONE": "31", "-": "2"}
 _GONE_AFTER_S = 3.0
 _FORGOTTEN_AFTER_S = 30.0
@@ -95,7 +95,7 @@ def page(listener: Listener, *, colour: bool) -> str:
 
 
 def _process_line(age: float, message: Any, *, colour: bool) -> str:
-    state = _STATES.get(message.state, "?") if age < _GONE_AFTER_S else "GONE"
+    state = STATES.get(message.state, "?") if age < _GONE_AFTER_S else "GONE"
     reason = message.state_text if state != "GONE" else f"silent for {age:.0f} s; last: {message.state_text}"
     return (
         f"{message.process:<15} {message.pid:>7} {_coloured(state, colour)} {_duration(message.uptime_s):>7} "

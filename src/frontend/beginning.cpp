@@ -3,6 +3,7 @@
 // How Lio begins: with what the IMU and the scans before it say of the motion, or with a velocity that is not known.
 #include <cmath>
 #include <format>
+#include <utility>
 
 #include "frontend/filter/scan_instant.h"
 #include "frontend/lio.h"
@@ -83,6 +84,16 @@ void Lio::begin_in_motion(std::string note) {
   initialisation_in_motion_.emplace(in_motion);
 }
 
+/// Behind a time of which nothing is known, that is too long to be bridged.
+void Lio::begin_behind(double seconds, std::string note) {
+  if (still_moves(seconds)) {
+    begin_in_motion(std::move(note));
+  } else {
+    reset();
+    start_note_ = std::move(note);
+  }
+}
+
 /// It goes on as it did when it was last heard of `seconds` ago.
 bool Lio::still_moves(double seconds) const {
   return velocity_known_ && !has_rested(kRestLasts) && seconds < kMotionLasts;
@@ -110,7 +121,7 @@ void Lio::await_start_in_motion(const ImuSample& sample) {
   const std::optional<FilterState> first = initialisation_in_motion_->add(sample);
   if (!first) return;
   start_moving(*first);
-  if (running_) initialisation_ = *initialisation_in_motion_;
+  if (running_) initialisation_ = *initialisation_in_motion_;  // which tells how it started
 }
 
 void Lio::start(const FilterState& first, bool at_rest) {

@@ -11,6 +11,10 @@ namespace ignis {
 namespace {
 
 constexpr double kSigmasToHaveLeft = 5.0;  // before the first scan
+// Of a lost filter, what cannot be.
+constexpr double kFastestVehicle = 40.0;  // m/s
+constexpr double kVaguestSpeed = 5.0;     // m/s, sigma: what dead reckoning is worth nothing with
+constexpr double kLargestBias = 5.0;      // sigmas of what is known of it before any drive
 
 }  // namespace
 
@@ -27,6 +31,14 @@ void Lio::note_evidence(const FilterState& predicted, ScanStats stats, const Sca
        .velocity_correction = filter_.nominal.v_odom - predicted.nominal.v_odom,
        .acceleration_sigma = std::sqrt(rest_acceleration_covariance(filter_, config_.gravity_m).diagonal().maxCoeff()),
        .restless = matcher_.is_restless()});
+}
+
+/// A lost filter can settle in a motion that its own map, drawn along, bears out, and then never comes back.
+bool Lio::has_flown_away() const {
+  if (!running_ || !velocity_known_ || trust_.trust_now() != Trust::kLost) return false;
+  const double sigma = std::sqrt(cautious_.diagonal().segment<3>(kVelocity).maxCoeff());
+  return live_.v_odom.norm() > kFastestVehicle || sigma > kVaguestSpeed ||
+         filter_.nominal.accel_bias.norm() > kLargestBias * config_.accel_bias_sigma;
 }
 
 /// Where scans and the IMU contradict each other along a direction that scans hardly observe, scans are wrong.

@@ -201,6 +201,11 @@ ScanResult Lio::refuse(const Scan& scan, ScanReason reason) const {
   return result;
 }
 
+void Lio::refuse_pending(std::vector<ScanResult>& refused) {
+  for (const Scan& scan : pending_) refused.push_back(refuse(scan, ScanReason::kNoImu));
+  pending_.clear();
+}
+
 /// Scans of one sensor follow one another. More of them would cost time and say what the last one said.
 bool Lio::comes_too_soon(const Scan& scan) const {
   if (!last_scan_end_) return false;

@@ -79,7 +79,7 @@ class Lio {
   [[nodiscard]] const char* begin_anew_after(Utime utime, std::int32_t session);
 
   /// After its state has been read back from bytes (see checkpoint.h): speed and turn rate go on over the time since
-  /// then, and scans are searched for widely. Until ten of them have confirmed the pose none enters the map,
+  /// then, and scans are searched for widely. Until ten of them have fitted as scans did before, none enters the map,
   /// no keyframe is made, and three in a row that contradict take back what the others said. A new session begins when
   /// the gap is too long or the confirmation does not come.
   void resume();

@@ -3,9 +3,7 @@
 // How a front end goes on where its killed predecessor was (see Lio::resume): speed and turn rate go on over the gap,
 // and scans have to confirm the pose before anything is built on it. A driver that hung leaves the same gap.
 #include <algorithm>
-#include <cmath>
 #include <format>
-#include <utility>
 
 #include "frontend/filter/steady_motion.h"
 #include "frontend/lio.h"
@@ -18,9 +16,6 @@ constexpr int kScansOfAConfirmation = 20;        // and so many scans, twice wha
 constexpr double kLongestConfirmation = 8.0;     // s: however few come
 constexpr int kContradictionsOfAWrongPlace = 3;  // in a row; single ones come in any curve
 constexpr double kSilenceSeconds = 0.3;          // of inertial samples and scans, that two samples cannot stand for
-constexpr double kFastestVehicle = 40.0;         // m/s
-constexpr double kVaguestSpeed = 5.0;            // m/s, sigma: what dead reckoning is worth nothing with
-constexpr double kLargestBias = 5.0;             // sigmas of what is known of it before any drive
 constexpr double kLongestSilence = 3.0;          // s: the longest that is bridged
 
 }  // namespace
@@ -84,16 +79,6 @@ void Lio::close_gap(Utime first_sample) {
                                 config_.resume_max_gap_s));
 }
 
-/// Behind a time of which nothing is known, that is too long to be bridged.
-void Lio::begin_behind(double seconds, std::string note) {
-  if (still_moves(seconds)) {
-    begin_in_motion(std::move(note));
-  } else {
-    reset();
-    start_note_ = std::move(note);
-  }
-}
-
 void Lio::await_confirmation(Utime since) {
   gap_end_ = since;
   scans_since_gap_ = 0;
@@ -131,19 +116,6 @@ void Lio::seek_confirmation(ScanReason reason) {
 void Lio::give_up_resumption(std::vector<ScanResult>& refused) {
   refuse_pending(refused);
   begin_in_motion("new session: scans did not confirm the pose after a gap");
-}
-
-/// A lost filter can settle in a motion that its own map, drawn along, bears out, and then never comes back.
-bool Lio::has_flown_away() const {
-  if (!running_ || !velocity_known_ || trust_.trust_now() != Trust::kLost) return false;
-  const double sigma = std::sqrt(cautious_.diagonal().segment<3>(kVelocity).maxCoeff());
-  return live_.v_odom.norm() > kFastestVehicle || sigma > kVaguestSpeed ||
-         filter_.nominal.accel_bias.norm() > kLargestBias * config_.accel_bias_sigma;
-}
-
-void Lio::refuse_pending(std::vector<ScanResult>& refused) {
-  for (const Scan& scan : pending_) refused.push_back(refuse(scan, ScanReason::kNoImu));
-  pending_.clear();
 }
 
 }  // namespace ignis

@@ -44,12 +44,12 @@ from soak_pages import troubles as troubles_of_pages  # noqa: E402
 from fault_drive import BUS, CONFIG, PORT, SCENE  # noqa: E402
 from ignis.bus import Listener  # noqa: E402
 from ignis.pipeline import Pipeline, enter_private_network  # noqa: E402
+from ignis.status import STATES  # noqa: E402
 from stream_server import Server  # noqa: E402
 
 matplotlib.use("Agg")
 
 PROCESSES = ("l1_driver", "lio_frontend", "graph_backend", "map_builder")
-STATES = ("OK", "DEGRADED", "LOST", "FAULT")
 NUMBERS = re.compile(r"[0-9.]+")
 MOST_TOLD = 400
 SETTLED_S = 60.0  # caches and windows fill

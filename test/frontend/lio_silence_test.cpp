@@ -39,13 +39,18 @@ double true_speed_at_end(const Drive& input) {
   return (input.truth(end).translation - input.truth(end - 0.1).translation).norm() / 0.1;
 }
 
+/// Neither samples nor scans of that time.
+void cut(Drive& input, Utime from, Utime to) {
+  std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+}
+
 TEST(Fault_P7, ADriverThatHangsInMotionCostsNoPlaceUpToTwoSecondsAndNeverAnUnannouncedError) {
   for (const double seconds : {0.25, 0.5, 1.0, 2.0, 2.9, 4.0}) {
     Drive input = drive();
     const Utime from = sample_at(input, 8.0)->utime;
     const Utime to = from + to_micros(seconds);
-    std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
-    std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+    cut(input, from, to);
     Lio lio(test::tuned_config());
     double error = 0.0;
     int unannounced = 0;
@@ -156,8 +161,7 @@ Drive with_a_jump(Drive whole, double missed, double told) {
   const Utime from = whole.imu.front().utime + to_micros(8.0);
   const Utime to = from + to_micros(missed);
   const Utime early = to_micros(missed - told);
-  std::erase_if(whole.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
-  std::erase_if(whole.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+  cut(whole, from, to);
   for (ImuSample& sample : whole.imu) sample.utime -= sample.utime >= to ? early : 0;
   for (Scan& scan : whole.scans) scan.utime -= scan.utime >= to ? early : 0;
   return whole;
@@ -205,8 +209,7 @@ TEST(Fault_P7, BehindALongSilenceOfAVehicleThatStandsItBeginsAtRest) {
   Drive input = test::simulate(test::bare_corridor(), test::straight_drive(60.0, 1.0), 14.0, {}, 1);
   const Utime from = input.imu.front().utime + to_micros(5.0);
   const Utime to = from + to_micros(5.0);
-  std::erase_if(input.imu, [&](const ImuSample& sample) { return sample.utime >= from && sample.utime < to; });
-  std::erase_if(input.scans, [&](const Scan& scan) { return scan.end_utime() >= from && scan.utime < to; });
+  cut(input, from, to);
   Lio lio(test::tuned_config());
   feed(lio, input, [](const ScanResult&) {});
   EXPECT_EQ(lio.session(), 1);
