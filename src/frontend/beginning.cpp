@@ -30,6 +30,11 @@ void define_position(ErrorCovariance& covariance) {
   covariance.diagonal().segment<3>(kPosition).setConstant(kVariance);
 }
 
+FrontendConfig in_motion(FrontendConfig config) {
+  config.start = "moving";
+  return config;
+}
+
 }  // namespace
 
 const char* Lio::begin_anew_after(Utime utime, std::int32_t session) {
@@ -78,13 +83,10 @@ ScanResult Lio::verdict_of_ended_session(const Scan& scan) const {
 void Lio::begin_in_motion(std::string note) {
   reset();
   start_note_ = std::move(note);
-  if (config_.start != "at_rest") return;
-  FrontendConfig in_motion = config_;
-  in_motion.start = "moving";
-  initialisation_in_motion_.emplace(in_motion);
+  if (config_.start == "at_rest") initialisation_in_motion_.emplace(in_motion(config_));
 }
 
-/// Behind a time of which nothing is known, that is too long to be bridged.
+/// Behind a time of which too little is known to go on from.
 void Lio::begin_behind(double seconds, std::string note) {
   if (still_moves(seconds)) {
     begin_in_motion(std::move(note));
@@ -104,20 +106,23 @@ bool Lio::has_rested(double seconds) const {
 }
 
 void Lio::await_start(const ImuSample& sample) {
-  if (imu_.samples().size() == 1) initialisation_ = ImuInitialisation(config_);  // the stream has begun anew
+  if (imu_.samples().size() == 1) {  // the stream has begun, perhaps anew
+    initialisation_ = ImuInitialisation(config_);
+    if (initialisation_in_motion_) initialisation_in_motion_.emplace(in_motion(config_));
+    awaited_since_ = sample.utime;
+  }
   start_finding_.clear();  // what scans did not tell before says nothing of what keeps it waiting now
   const std::optional<FilterState> first = initialisation_.add(sample);
   if (initialisation_in_motion_) await_start_in_motion(sample);
   if (running_ || !first) return;
   if (config_.start == "moving") {
     start_moving(*first);
-  } else if (!initialisation_in_motion_ || seconds_between(*lost_since_, sample.utime) > kLongestSearch) {
+  } else if (!initialisation_in_motion_ || seconds_between(awaited_since_, sample.utime) > kLongestSearch) {
     start(*first, true);
   }
 }
 
 void Lio::await_start_in_motion(const ImuSample& sample) {
-  if (!lost_since_) lost_since_ = sample.utime;
   const std::optional<FilterState> first = initialisation_in_motion_->add(sample);
   if (!first) return;
   start_moving(*first);

@@ -49,7 +49,7 @@ void Lio::reset() {
   imu_ = ImuBuffer();
   initialisation_ = ImuInitialisation(config_);
   initialisation_in_motion_.reset();
-  lost_since_.reset();
+  awaited_since_ = 0;
   start_motion_ = StartMotion(config_);
   start_finding_.clear();
   awaits_scans_ = false;
@@ -107,7 +107,7 @@ ImuResult Lio::add_imu(const ImuSample& sample) {
   result.fault = imu_.add(believed);
   if (result.fault != ImuFault::kNone) return result;
   if (confirmation_failed(sample.utime)) {
-    give_up_resumption(result.scans);
+    give_up_resumption(sample.utime, result.scans);
     return result;
   }
   if (has_flown_away()) {

@@ -150,7 +150,7 @@ class Lio {
   void begin_anew();
   [[nodiscard]] bool falls_to_ended_session(const Scan& scan) const;
   [[nodiscard]] ScanResult verdict_of_ended_session(const Scan& scan) const;
-  void give_up_resumption(std::vector<ScanResult>& refused);
+  void give_up_resumption(Utime now, std::vector<ScanResult>& refused);
   [[nodiscard]] bool has_flown_away() const;
   void refuse_pending(std::vector<ScanResult>& refused);
   void close_gap(Utime first_sample);
@@ -175,7 +175,7 @@ class Lio {
   ImuBuffer imu_;
   ImuInitialisation initialisation_;
   std::optional<ImuInitialisation> initialisation_in_motion_;  ///< beside it, after a loss on the way
-  std::optional<Utime> lost_since_;                            ///< since when it looks for a motion
+  Utime awaited_since_ = 0;                                    ///< a start: first sample of the session
   StartMotion start_motion_;                                   ///< until the start, or while first scans are gathered
   bool awaits_scans_ = false;                                  ///< none had come at the start
   std::optional<Utime> gathering_since_;                       ///< end of the first of them

@@ -113,9 +113,9 @@ void Lio::seek_confirmation(ScanReason reason) {
 
 /// Nobody knows where in the old map the vehicle is, nor, after seconds of dead reckoning across a gap, how fast it
 /// goes: a new session that went on with that would fly away. Scans that waited are `refused`.
-void Lio::give_up_resumption(std::vector<ScanResult>& refused) {
+void Lio::give_up_resumption(Utime now, std::vector<ScanResult>& refused) {
   refuse_pending(refused);
-  begin_in_motion("new session: scans did not confirm the pose after a gap");
+  begin_behind(seconds_between(*gap_end_, now), "new session: scans did not confirm the pose after a gap");
 }
 
 }  // namespace ignis

@@ -204,12 +204,44 @@ TEST(Fault_P7, BehindALongSilenceASessionBeginsInMotionToo) {
   EXPECT_NEAR(speed_at_end(lio, drive()), true_speed_at_end(drive()), 0.2) << lio.status().reason;
 }
 
+/// The first sample behind the silence claims to be of the future; the next one takes its place.
+TEST(Fault_P7, ABrokenStampBehindALongSilenceKeepsNoSessionFromBeginningInMotion) {
+  const Drive input = silent(4.0, false);
+  Lio lio(test::tuned_config());
+  auto scan = input.scans.begin();
+  for (const ImuSample& sample : input.imu) {
+    const std::int32_t before = lio.session();
+    (void)lio.add_imu(sample);
+    if (lio.session() != before) {
+      ImuSample broken = sample;
+      broken.utime += 3'600'000'000;
+      EXPECT_EQ(lio.add_imu(broken).fault, ImuFault::kNone) << "nothing is known yet that it could be held against";
+    }
+    for (; scan != input.scans.end() && scan->end_utime() <= sample.utime; ++scan) (void)lio.add_scan(*scan);
+  }
+  EXPECT_EQ(lio.session(), 1);
+  EXPECT_TRUE(lio.status().running) << lio.status().reason;
+}
+
 /// Scans do not tell there how fast it goes. It stood before, and is not asked.
 TEST(Fault_P7, BehindALongSilenceOfAVehicleThatStandsItBeginsAtRest) {
   Drive input = test::simulate(test::bare_corridor(), test::straight_drive(60.0, 1.0), 14.0, {}, 1);
   const Utime from = input.imu.front().utime + to_micros(5.0);
   const Utime to = from + to_micros(5.0);
   cut(input, from, to);
+  Lio lio(test::tuned_config());
+  feed(lio, input, [](const ScanResult&) {});
+  EXPECT_EQ(lio.session(), 1);
+  EXPECT_TRUE(lio.status().running) << lio.status().reason;
+}
+
+/// The same where the silence was short and nothing confirms the place behind it.
+TEST(Fault_P7, AVehicleThatStandsWhereNoScanComesBeginsAtRestWithoutWaitingForAMotion) {
+  Drive input = test::simulate(test::bare_corridor(), test::straight_drive(60.0, 1.0), 14.0, {}, 1);
+  const Utime from = input.imu.front().utime + to_micros(5.0);
+  const Utime to = from + to_micros(0.5);
+  cut(input, from, to);
+  std::erase_if(input.scans, [&](const Scan& scan) { return scan.utime >= from; });
   Lio lio(test::tuned_config());
   feed(lio, input, [](const ScanResult&) {});
   EXPECT_EQ(lio.session(), 1);
